@@ -15,14 +15,15 @@ from functools import cached_property
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, TimeReference
 from std_msgs.msg import Bool, Float64, Header, String
 
-from interfaces.limits import LARGEST
+from interfaces import cause
+from interfaces.limits import LARGEST, LARGEST_MESSAGE, bad_report
 from reactive_node import stamps
 
 try:
@@ -36,6 +37,7 @@ ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
 DRIVE_TIMEOUT = 0.4  # s for which the engines' drive accepts an `on`
 CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A3)
 FRAME = "base"
+LONGEST_NAME = 255  # characters of the name of a node
 
 Conversion = Callable[[Any], Any]
 
@@ -63,7 +65,7 @@ def _point(position: Position) -> PointStamped:
 
 
 class PlanarTwist(NamedTuple):
-    """A velocity of the effector."""
+    """How the effector moves in its plane."""
 
     stamp: int
     """When it was true [ns since 1970]."""
@@ -78,24 +80,64 @@ class PlanarTwist(NamedTuple):
         return math.hypot(self.x, self.y)
 
 
-def _velocity(message: TwistStamped) -> PlanarTwist:
+def _planar_twist(message: TwistStamped) -> PlanarTwist:
     header, linear = message.header, message.twist.linear
     stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
     return PlanarTwist(stamp, linear.x, linear.y, message.twist.angular.z, header.frame_id)
 
 
-def _twist(velocity: PlanarTwist) -> TwistStamped:
-    stamp, x, y, turn, frame = velocity
+def _twist_stamped(twist: PlanarTwist) -> TwistStamped:
+    stamp, x, y, turn, frame = twist
     header = Header(stamp=stamps.time_message(stamp), frame_id=frame)
     return TwistStamped(header=header, twist=Twist(linear=Vector3(x=x, y=y), angular=Vector3(z=turn)))
+
+
+class DrivenTime(NamedTuple):
+    """For how long a drive has moved the joints."""
+
+    stamp: int
+    """When it was published [ns since 1970]."""
+    seconds: float
+    source: str
+    """The host of the drive: :func:`interfaces.service.host.identity`."""
+    host: str
+    """The name of its host, for people."""
+
+
+def _driven_time(message: TimeReference) -> DrivenTime:
+    stamp, time = message.header.stamp, message.time_ref
+    return DrivenTime(
+        stamp.sec * 10**9 + stamp.nanosec,
+        time.sec + time.nanosec / 1e9,
+        message.source,
+        message.header.frame_id,
+    )
+
+
+def _time_reference(driven: DrivenTime) -> TimeReference:
+    header = Header(stamp=stamps.time_message(driven.stamp), frame_id=driven.host)
+    time = stamps.time_message(round(driven.seconds * 1e9))
+    return TimeReference(header=header, time_ref=time, source=driven.source)
+
+
+class Sender(NamedTuple):
+    """The sender of a command to the engines."""
+
+    command: str
+    node: str
 
 
 _CONVERSIONS: dict[Any, tuple[Conversion, Conversion]] = {
     Bool: (attrgetter("data"), lambda value: Bool(data=value)),
     Float64: (attrgetter("data"), lambda value: Float64(data=value)),
     String: (attrgetter("data"), lambda value: String(data=value)),
+    KeyValue: (
+        lambda message: Sender(message.key, message.value),
+        lambda sender: KeyValue(key=sender.command, value=sender.node),
+    ),
     PointStamped: (_position, _point),
-    TwistStamped: (_velocity, _twist),
+    TimeReference: (_driven_time, _time_reference),
+    TwistStamped: (_planar_twist, _twist_stamped),
     Header: (
         lambda message: stamps.from_message(message.stamp),
         lambda time: Header(stamp=stamps.to_message(time)),
@@ -130,6 +172,8 @@ class Topic:
     """The name of the topic without which this one falls silent; empty if there is none."""
     raw: bool = False
     """Whether its values are whole messages, whatever their type."""
+    largest: int = LARGEST_MESSAGE
+    """A message of more octets is dropped before it is deserialized."""
 
     @cached_property
     def value(self) -> Conversion:
@@ -169,16 +213,24 @@ def _not_a_length(value: float) -> str:
     return _not_usable(value) or ("" if value >= 0 else f"{value} is negative")
 
 
+def _not_a_driven_time(driven: DrivenTime) -> str:
+    return _not_a_length(driven.seconds)
+
+
 def _not_a_position(position: Position) -> str:
     return _not_usable(position.x, position.y)
 
 
-def _not_a_velocity(velocity: PlanarTwist) -> str:
-    return _not_usable(velocity.x, velocity.y, velocity.turn)
+def _not_a_twist(twist: PlanarTwist) -> str:
+    return _not_usable(twist.x, twist.y, twist.turn)
 
 
 def _not_pressed(beat: bool) -> str:
     return "" if beat else "a released switch is no sign of life"
+
+
+def _not_a_name(name: str) -> str:
+    return "" if 0 < len(name) <= LONGEST_NAME else f"{name[:40]!r} is no name of a node"
 
 
 def _not_one_of(*known: str) -> Callable[[str], str]:
@@ -219,13 +271,14 @@ L2 = Topic(
 )
 DRIVEN_TIME = Topic(
     "driven_time",
-    Float64,
+    TimeReference,
     _qos(1, lifespan=DRIVE_TIMEOUT),
     "s",
     ("drive",),
     ("config_theta1", "config_theta2", *OPERATOR_NODES),
-    "for how long the drive has moved the joints; only in a scenario with a drive, by which they then move",
-    _not_a_length,
+    "`time_ref`: for how long the drive has moved the joints; only in a scenario with a drive, by which they "
+    "then move. `source`: the host of the drive. A joint follows that of its own host, and reports others",
+    _not_a_driven_time,
 )
 THETA1 = Topic(
     "theta1",
@@ -279,7 +332,7 @@ EFFECTOR_TWIST = Topic(
     ("operator_page",),
     f"x, y and the turn about z in frame `{FRAME}`, at 50 Hz; true at the time in `header.stamp`. "
     "Silent while it is unknown: where a movement begins or ends, and while a source is dead",
-    _not_a_velocity,
+    _not_a_twist,
     longest_gap=math.inf,
 )
 JOINT_STATES = Topic(
@@ -322,6 +375,18 @@ OPERATOR_HEARTBEAT = Topic(
     "waited in a queue is a sign of life",
     _not_pressed,
 )
+OPERATOR_HAND = Topic(
+    "operator_hand",
+    Header,
+    _qos(1, reliable=False),
+    "",
+    ("dead_mans_switch",),
+    (),
+    f"whose hand sends `{OPERATOR_HEARTBEAT.name}`: `frame_id` is the node. At most 5 Hz; for display only",
+    longest_gap=math.inf,
+    follows=OPERATOR_HEARTBEAT.name,
+    raw=True,
+)
 OPERATOR_PRESENCE = Topic(
     "operator_presence",
     Header,
@@ -355,6 +420,18 @@ ENGINES = Topic(
     _not_one_of(TURN_OFF, TURN_ON),
     longest_gap=math.inf,
 )
+ENGINES_SENDER = Topic(
+    "engines/sender",
+    KeyValue,
+    _EVENTS,
+    "",
+    tuple(each for each in ENGINES.publishers if each != "terminal"),
+    ("engine_controller",),
+    f"who has just sent a command on `{ENGINES.name}`: `key` is the command, `value` the node. For display "
+    "only: a command counts without it",
+    lambda sender: ENGINES.problem(sender.command) or _not_a_name(sender.node),
+    longest_gap=math.inf,
+)
 ENGINES_STATE = Topic(
     "engines/state",
     String,
@@ -367,6 +444,18 @@ ENGINES_STATE = Topic(
     "So two controllers that disagree move nothing",
     _not_one_of(ON, OFF),
 )
+ENGINES_CAUSE = Topic(
+    "engines/cause",
+    DiagnosticArray,
+    _STATE,
+    "s",
+    ("engine_controller",),
+    (),
+    f"why `{ENGINES_STATE.name}` is as it is, in the words of `message`; `values` name the deciding event, "
+    "its sender and age, and why a `turn_on` was refused. Within 0.2 s of each change; for display only",
+    cause.problem,
+    longest_gap=math.inf,
+)
 DIAGNOSTICS = Topic(
     "/diagnostics",
     DiagnosticArray,
@@ -375,6 +464,7 @@ DIAGNOSTICS = Topic(
     (EVERY_SERVICE,),
     ("engine_controller", "sentinel", *OPERATOR_NODES, FLEET),
     "health, at 1 Hz, and at once to a new subscriber",
+    bad_report,
     longest_gap=1.0,
 )
 
@@ -398,7 +488,8 @@ def is_latched(qos: QoSProfile) -> bool:
     return bool(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def _describe(qos: QoSProfile) -> str:
+def describe(qos: QoSProfile) -> str:
+    """Return a QoS in words."""
     parts = [
         "reliable" if qos.reliability == ReliabilityPolicy.RELIABLE else "best effort",
         "transient local" if is_latched(qos) else "volatile",
@@ -417,7 +508,7 @@ def markdown() -> str:
         row = (
             f"`{topic.name}`",
             topic.type_name.replace("/msg", ""),
-            _describe(topic.qos),
+            describe(topic.qos),
             topic.unit,
             ", ".join(topic.publishers),
             ", ".join(topic.subscribers),
@@ -434,7 +525,7 @@ def mermaid() -> str:
     """
     lines = ["flowchart LR"]
     for topic in CONTRACT:
-        if topic is not DIAGNOSTICS:
+        if topic is not DIAGNOSTICS and topic.subscribers:
             readers = [node for node in topic.subscribers if node not in (*OPERATOR_NODES, FLEET)]
             ends = (" & ".join(topic.publishers), " & ".join(readers or topic.subscribers))
             lines.append(f"    {ends[0]} -- {topic.name} --> {ends[1]}")

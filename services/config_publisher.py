@@ -15,20 +15,10 @@ from dataclasses import dataclass
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
 from interfaces.service.epoch import Epoch
-from interfaces.sources import playback
+from interfaces.sources import driving
 from interfaces.sources.player import Player
 from interfaces.sources.settings import Settings
-from interfaces.topics import (
-    CONFIGURATION,
-    DRIVE_TIMEOUT,
-    DRIVEN_TIME,
-    JOINTS,
-    L1,
-    L2,
-    THETA1,
-    THETA2,
-    Topic,
-)
+from interfaces.topics import CONFIGURATION, JOINTS, L1, L2, THETA1, THETA2, Topic
 
 
 def _parameters(topic: Topic, default: float, within: tuple[float, float]) -> type:
@@ -60,8 +50,7 @@ def wire(node: ServiceNode, topic: Topic) -> None:
     timeline = player.scenario.configuration.get(topic.name)
     track = player.state(timeline)
     if timeline and topic in JOINTS and player.scenario.drive:
-        # A time that waited is not played: no joint may move after the drive has stopped.
-        track = playback.driven(timeline, node.observe(DRIVEN_TIME, max_age=DRIVE_TIMEOUT))
+        track = driving.track(node, timeline)
     node.publish(topic, value.instead_of(track))
 
 

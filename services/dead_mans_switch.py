@@ -8,16 +8,17 @@ may also command the engines until a person takes the switch.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import reactivex as rx
 from reactivex import Observable
 
-from interfaces import service
+from interfaces import hand, service
 from interfaces.service import ServiceNode, parameter
 from interfaces.service.epoch import Epoch
 from interfaces.sources.player import Player
 from interfaces.sources.settings import Settings
-from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_ON
+from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HAND, OPERATOR_HEARTBEAT, TURN_ON
 
 
 def heartbeats(
@@ -65,6 +66,7 @@ class Parameters:
         "whether the switch is pressed: it stays so without a hand, for developers",
         settable=True,
     )
+    hand: str = parameter("", None, "", "the node that has set `pressed`, by its own word", settable=True)
 
 
 def wire(node: ServiceNode) -> None:
@@ -74,8 +76,11 @@ def wire(node: ServiceNode) -> None:
     scenario = player.scenario
     pressed, rate = settings.keep("pressed", if_lost=False), settings.keep("rate")
     single = pressed.until_set(player.events(scenario.heartbeats))
-    beats = heartbeats(pressed.instead_of(player.state(scenario.pressed)), rate.values, single)
+    # A record shows each rate that is set, because the judge compares the heartbeats with it.
+    rates = rate.values.do_action(partial(node.health.note_parameter, "rate"))
+    beats = heartbeats(pressed.instead_of(player.state(scenario.pressed)), rates, single).share()
     node.publish(OPERATOR_HEARTBEAT, beats)
+    node.publish(OPERATOR_HAND, hand.headers(beats, node.get_name()))
     states, heard = map(node.observe, (ENGINES_STATE, ENGINES))
     commands = engine_commands(player.events(scenario.commands), states, heard)
     # A person who takes the switch replaces the virtual operator for the commands too.

@@ -3,13 +3,17 @@
 User story (ours): as a robot operator, I see the arm stand still when the engines go off, and go on from
 there when I turn them on again.
 
-In a scenario with a drive, the joints play their tracks by the driven time. It is kept as settings are, so a
-restart moves no joint. An `on` counts only if no `off` came within 400 ms before it: of two controllers (two
-hosts that were cut from each other), none moves the joints against the other.
+In a scenario with a drive, the joints play their tracks by the driven time. It is a time, not angles: both
+joints agree on it, and each remains what sets its joint. It is kept as settings are, in memory, on no disk,
+so a restart moves no joint; while it cannot be kept, it stands still. It names its host, for a joint follows
+the drive of its own host only. An `on` counts only if no `off` came within 400 ms before it: of two
+controllers (two hosts that were cut from each other), none moves the joints against the other.
 """
 
 from __future__ import annotations
 
+import socket
+from collections.abc import Callable
 from datetime import datetime
 from functools import partial
 
@@ -18,19 +22,23 @@ from reactivex import Observable
 
 from interfaces import service
 from interfaces.permission import NEVER, EngineState, engine_states, unopposed
-from interfaces.service import ServiceNode
+from interfaces.service import ServiceNode, host
 from interfaces.service.epoch import Epoch
 from interfaces.sources.player import Player
 from interfaces.sources.settings import Settings
-from interfaces.topics import DRIVEN_TIME, ON
+from interfaces.topics import DRIVEN_TIME, ON, DrivenTime
 
 LONGEST_STEP = 2  # periods: after a pause, the joints do not jump
 
 
-def driven_time(states: Observable[EngineState], begin: float, period: float) -> Observable[float]:
+def driven_time(
+    states: Observable[EngineState], begin: float, period: float, keep: Callable[[float], bool]
+) -> Observable[float]:
     """Emit every ``period`` [s] the driven time [s]: it passes while an unopposed ``on`` counts.
 
     :param begin: the driven time at the beginning.
+    :param keep: keeps a time for the next process, and returns whether it did. A time that is not kept does
+        not pass: the joints would jump back when the drive restarts.
     """
 
     def accepted_until(state: EngineState) -> datetime:
@@ -38,7 +46,8 @@ def driven_time(states: Observable[EngineState], begin: float, period: float) ->
 
     def step(time: float, tick: tuple[tuple[datetime, float], datetime]) -> float:
         (now, passed), until = tick
-        return time + min(passed, LONGEST_STEP * period) if now < until else time
+        then = time + min(passed, LONGEST_STEP * period) if now < until else time
+        return then if keep(then) else time
 
     ticks = rx.interval(period).time_interval().timestamp()
     passing = ticks.map(lambda it: (it.timestamp, it.value.interval.total_seconds()))
@@ -51,10 +60,11 @@ def wire(node: ServiceNode) -> None:
     rate = player.scenario.drive
     if rate is None:
         return
-    times = driven_time(engine_states(node), settings.recall("time", 0.0), 1.0 / rate)
-    # Kept before it is published: after a restart, the joints do not move back.
-    kept = times.do_action(partial(settings.remember, "time"))
-    node.publish(DRIVEN_TIME, epoch.start(kept))
+    begin, keep = settings.recall("time", 0.0), partial(settings.remember, "time")
+    times = driven_time(engine_states(node), begin, 1.0 / rate, keep)
+    clock, source, name = node.get_clock(), host.identity(), socket.gethostname()
+    driven = times.map(lambda seconds: DrivenTime(clock.now().nanoseconds, seconds, source, name))
+    node.publish(DRIVEN_TIME, epoch.start(driven))
 
 
 if __name__ == "__main__":

@@ -6,29 +6,18 @@ incapacitated, that is, releases the dead man's switch 3 times for longer than 3
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Any, NamedTuple
+from typing import Any
 
 import reactivex as rx
 from reactivex import Observable
 
 from interfaces import service, topics
+from interfaces.activity import Activity, reading_period, resume
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Epoch
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node.stamps import Timestamp
-
-READING = 0.1  # s at most between two looks for a heartbeat: thousands cost no more than those of a switch
-DISCOVERY = 1.0  # s from the start of a successor until it surely hears the heartbeats
-
-
-class Activity(NamedTuple):
-    """A conclusion of the watchdog: ALIVE, with the source time of the heartbeat, MISSED or INCAPACITATED."""
-
-    conclusion: str
-    seen: datetime | None = None
 
 
 @dataclass(frozen=True)
@@ -47,39 +36,32 @@ class Parameters:
     @property
     def reading(self) -> float:
         """Time between two looks for a heartbeat [s]."""
-        # Samples come equally long after a look, or the jitter would add to a silence.
-        return self.sampling / math.ceil(self.sampling / min(READING, self.lifespan / 2))
+        return reading_period(self.sampling, self.lifespan)
 
 
 DEFAULTS = Parameters()
 
 
 def operator_activity(
-    heartbeats: Observable[Timestamp[Any]], given: Parameters = DEFAULTS, *, resumes: bool = False
+    heartbeats: Observable[Timestamp[Any]], parameters: Parameters = DEFAULTS, *, resumes: bool = False
 ) -> Observable[Activity]:
     """Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
 
     A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
-    once and begins new strikes.
-
-    :param resumes: whether the engines wait for a successor. It samples the first heartbeat at once. It
-        counts no silence before that one until it has surely discovered the switch.
+    once and begins new strikes. A successor ``resumes``: the engines wait for it.
     """
 
     def watch(heartbeats: Observable[Timestamp[Any]]) -> Observable[Activity]:
         alive = heartbeats.map(lambda heartbeat: Activity(ALIVE, heartbeat.timestamp))
         conclusions = (
-            alive.sample(rx.interval(given.sampling))
-            .timeout(given.silence)
+            alive.sample(rx.interval(parameters.sampling))
+            .timeout(parameters.silence)
             .catch(lambda error, _: rx.throw(error).start_with(Activity(MISSED)))
-            .retry(given.strikes)
+            .retry(parameters.strikes)
             .catch(lambda error, _: alive.take(1).start_with(Activity(INCAPACITATED)))
             .repeat()
         )
-        if not resumes:
-            return conclusions
-        first = alive.take(1).map(conclusions.start_with)
-        return rx.amb(first, rx.timer(DISCOVERY).map(lambda _: conclusions)).merge_all()
+        return resume(alive, conclusions) if resumes else conclusions
 
     return heartbeats.concat(rx.never()).publish(watch)  # the end of a source is a silence
 
@@ -96,23 +78,21 @@ def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> O
 
 
 def wire(node: ServiceNode) -> None:
-    given = node.declare(Parameters)
+    parameters = node.declare(Parameters)
     epoch = Epoch(node)
-
-    def warn(activity: Activity) -> None:
-        node.get_logger().warning(f"operator {activity.conclusion}")
-
     heartbeats = node.observe_sampled(
-        topics.OPERATOR_HEARTBEAT, given.reading, timestamped=True, max_age=given.lifespan
+        topics.OPERATOR_HEARTBEAT, parameters.reading, timestamped=True, max_age=parameters.lifespan
     )
     # Silences count from the origin of the scenario: before it, no operator is expected.
-    activity = epoch.start(operator_activity(heartbeats, given, resumes=epoch.is_past)).share()
+    activity = epoch.start(operator_activity(heartbeats, parameters, resumes=epoch.is_past)).share()
     presence = activity.filter(lambda it: it.conclusion == ALIVE)
     node.publish(topics.OPERATOR_PRESENCE, presence.map(lambda it: it.seen))
-    node.publish(topics.OPERATOR_ACTIVITY, activity.map(lambda it: it.conclusion))
-    node.publish(topics.ENGINES, engine_commands(activity, repeat=given.repeat))
+    conclusions = activity.map(lambda it: it.conclusion)
+    node.publish(topics.OPERATOR_ACTIVITY, conclusions)
+    node.publish(topics.ENGINES, engine_commands(activity, repeat=parameters.repeat))
     # A log message takes time, so it comes after the messages.
-    activity.filter(lambda it: it.conclusion != ALIVE).subscribe(warn, scheduler=node.scheduler)
+    losses = conclusions.filter(lambda it: it != ALIVE)
+    losses.subscribe(lambda it: node.get_logger().warning(f"operator {it}"), scheduler=node.scheduler)
 
 
 if __name__ == "__main__":

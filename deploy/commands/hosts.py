@@ -18,6 +18,8 @@ from deploy.supervision.probe import is_here
 from deploy.supervision.sentinel import reported
 from deploy.supervision.supervisord import Program
 from deploy.supervision.system import System
+from interfaces.limits import newest
+from interfaces.plain_text import plain
 from interfaces.service.clocks import Clocks, difference
 from interfaces.service.health import Health, healths, listening
 from interfaces.service.process import SUPERVISED
@@ -30,7 +32,7 @@ _TWICE = (
 
 
 class Hosts:
-    """What the services of an arm have reported."""
+    """The reports of the services of an arm."""
 
     def __init__(self, namespace: str) -> None:
         """:param namespace: that of the arm."""
@@ -45,11 +47,13 @@ class Hosts:
         self._clocks.hear(message)
         for program, health in healths(message, self._namespace).items():
             self.healths[health.host, program] = health
-        self.processes |= {program.name: program for program in reported(message, self._namespace)}
+        self.healths = newest(self.healths)
+        seen = {program.name: program for program in reported(message, self._namespace)}
+        self.processes = newest(self.processes | seen)
 
     def clocks(self) -> str:
         """Return a line for each other host with the difference of its clock."""
-        return "".join(f"Clocks: {difference(*it)}\n" for it in self._clocks.behind().items())
+        return "".join(f"Clocks: {plain(difference(*it))}\n" for it in self._clocks.differences().items())
 
     def check(self, ours: Mapping[int, str]) -> None:
         """Refuse a start beside these hosts.
@@ -63,21 +67,21 @@ class Hosts:
         for (host, program), health in sorted(self.healths.items()):
             is_own = is_here(host) and ours.get(health.pid) == program
             if program in here and not is_own:
-                raise DeploymentError(_TWICE.format(program=program, host=host))
+                raise DeploymentError(_TWICE.format(program=program, host=plain(host)))
             # Another host of our name would hide its clock. The other part may run on this host, too.
             if program in elsewhere and is_here(host) and not _is_process(health.pid, program):
                 raise DeploymentError(
                     f"both hosts are named {host}: give each its own hostname (hostnamectl)"
                 )
         for host, behind in self._clocks.wrong().items():
-            raise DeploymentError(f"Clocks: {difference(host, behind)}; synchronise both (NTP or PTP)")
+            raise DeploymentError(f"Clocks: {plain(difference(host, behind))}; synchronise both (NTP or PTP)")
 
     def check_again(self) -> None:
         """Raise DeploymentError if another host runs one of our programs."""
         here = {program.name for program in manifest.programs()}
         for host, program in sorted(self.healths):
             if program in here and not is_here(host):
-                raise DeploymentError(_TWICE.format(program=program, host=host))
+                raise DeploymentError(_TWICE.format(program=program, host=plain(host)))
 
 
 @contextmanager

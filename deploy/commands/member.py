@@ -37,7 +37,10 @@ class Member:
         try:
             arguments = enclave.arguments(name, namespace)
             with middleware.without_shared_memory():
-                rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+                rclpy.init(
+                    args=[*middleware.WITHOUT_LOG_FILES, *arguments],
+                    signal_handler_options=SignalHandlerOptions.NO,
+                )
                 self.node = ReactiveNode(f"{name}_{os.getpid()}", namespace=namespace)
         except (RuntimeError, UserError) as error:
             rclpy.try_shutdown()

@@ -72,7 +72,7 @@ def arguments(name: str, namespace: str) -> list[str]:
 def keys(enclave: str) -> Keys | None:
     """Return the keys of an enclave in the keystore of this environment.
 
-    ``None`` without security, or if its permissions tell no validity: rclpy tells what is wrong with them.
+    ``None`` without security, or if its permissions have no validity: rclpy reports what is wrong with them.
     """
     if not _is_wanted():
         return None

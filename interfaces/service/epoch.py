@@ -16,6 +16,7 @@ from interfaces.service import ServiceNode, parameter
 
 T = TypeVar("T")
 EPOCH = "scenario_epoch"
+_SOON = 1e-6  # s
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class _Parameters:
 
 
 class Epoch:
-    """Tells a process when the scenario begins; the first value is final."""
+    """Gives a process the time when the scenario begins; the first value is final."""
 
     def __init__(self, node: ServiceNode) -> None:
         start = time.monotonic()
@@ -61,5 +62,6 @@ class Epoch:
         """Subscribe to an observable when the scenario begins, at once if it has begun."""
         # RxPY's delay_subscription schedules each item again, which doubles the cost of a source.
         known = self._epochs.filter(lambda epoch: epoch >= 0.0).take(1)
-        begun = known.flat_map(lambda _: rx.timer(max(0.0, -self.elapsed())))
+        # With a delay, it waits for the beginning of a simulation: the time of the scheduler jumps there.
+        begun = known.flat_map(lambda _: rx.timer(max(_SOON, -self.elapsed())))
         return begun.flat_map(lambda _: items)

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -21,17 +22,60 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from interfaces.limits import LARGEST
+from interfaces.limits import MOST_KNOWN, PID, PUBLISHED, SINCE_OUTPUT, age, whole
+from interfaces.plain_text import plain
 from interfaces.service.beats import beat
 from interfaces.service.enclave import Keys
+from interfaces.service.reading import reading, unreported
 from interfaces.topics import DIAGNOSTICS
+from reactive_node import stamps
 
 PERIOD = 1.0  # [s]
-_PID, _PUBLISHED, _SINCE_OUTPUT = "pid", "published", "seconds_since_output"
+FASTEST = "fastest"
+"""A fact of a joint that follows a drive: the speed that its scenario does not exceed [rad/s]."""
+BY_HAND = "by hand"
+"""A fact of a source whose value is set by hand: the name of the parameter."""
 _SINCE_TURN_OFF = "seconds_since_turn_off"
 _PARAMETER = "parameter "  # before its name
 _REFUSED = "refused "  # before the subject
 _REASONS, _OTHER_REASONS = 4, "other reasons"  # in a report, for each subject
+_LONGEST_REASON = 200  # characters: others choose their number and length, and a report must not be too large
+_LONGEST_MESSAGE = 4000  # characters
+_LONGEST_HOST = 64  # characters: HOST_NAME_MAX of Linux
+_MOST_REFUSED = 50  # samples of a subject in a report
+_NUMBER = re.compile(r"(?i)(?<![\w/.-])[-+]?(?:0x[\da-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?|(?:nan|inf)\b)")
+"""A number in a text, not one that is a part of a name such as `l1`, `/arm/2` or `host-2`."""
+
+
+def cause(reason: str) -> str:
+    """Return a reason without the numbers that were measured: it stays the same while they change."""
+    return _NUMBER.sub("#", reason)
+
+
+class _Remarks:
+    """The reasons of a subject since the last report: of each cause the first text, and how often it came."""
+
+    def __init__(self) -> None:
+        self._texts: dict[str, str] = {}
+        self._counts: Counter[str] = Counter()
+
+    def add(self, reason: str) -> None:
+        text = reason[:_LONGEST_REASON]
+        # Of more than the text, which ends earlier where numbers are long.
+        found = cause(reason[: 4 * _LONGEST_REASON])[:_LONGEST_REASON]
+        if found not in self._texts and len(self._texts) >= _REASONS:
+            found = text = _OTHER_REASONS
+        self._texts.setdefault(found, text)
+        self._counts[found] += 1
+
+    def causes(self) -> set[str]:
+        return set(self._texts)
+
+    def counts(self) -> Mapping[str, int]:
+        counts: Counter[str] = Counter()
+        for found, text in self._texts.items():
+            counts[text] += self._counts[found]
+        return counts
 
 
 class HealthReporter:
@@ -47,32 +91,33 @@ class HealthReporter:
         self._last_output: float | None = None
         self._last_turn_off: float | None = None
         self.standing: Mapping[str, str] = {}
-        """What each report warns of until it is changed: the reason by subject."""
+        """The warnings of each report until they are changed: the reason by subject."""
         self.facts: Mapping[str, str] = {}
-        """What each report tells besides until it is changed, by name."""
+        """Further facts of each report until they are changed, by name."""
         self.keys: Keys | None = None
         """Those with which the process has joined: each report warns of their end, if that is soon."""
-        self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
-        self._logged: set[str] = set()  # the remarks of the last report
+        self._remarks: defaultdict[str, _Remarks] = defaultdict(_Remarks)  # since the last report
+        self._of_last_second: Mapping[str, _Remarks] = {}  # which a new subscriber hears as well
+        self._logged: set[tuple[str, str]] = set()  # the causes in the last report, by subject
         self._parameters: dict[str, str] = {}
         self._counts: Counter[str] = Counter()
         self._refused: dict[str, list[tuple[int, int | None]]] = {}  # since the last report, by subject
-        self._publisher = node.create_publisher(
+        self.publisher = node.create_publisher(
             DIAGNOSTICS.type,
             DIAGNOSTICS.name,
             DIAGNOSTICS.qos,
             # The launcher at its start and the sentinel after a restart need not wait for the next report.
-            event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
+            event_callbacks=PublisherEventCallbacks(matched=self.on_matched),
         )
         # On the steady clock: a paused simulation must not look like a hung service.
-        node.create_timer(PERIOD, self._on_period, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.create_timer(PERIOD, self.on_period, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def count_output(self) -> None:
         self._published += 1
         self._last_output = time.monotonic()
 
     def note_turn_off(self) -> None:
-        """Tell in each report when the last ``turn_off`` was sent: a message does not name its sender."""
+        """Report when the last ``turn_off`` was sent."""
         self._last_turn_off = time.monotonic()
 
     def drop(self, subject: str, reason: str) -> None:
@@ -82,49 +127,52 @@ class HealthReporter:
 
     def remark(self, subject: str, reason: str) -> None:
         """Make the next report a warning with this reason."""
-        reasons = self._remarks.setdefault(subject, Counter())
-        reasons[reason if reason in reasons or len(reasons) < _REASONS else _OTHER_REASONS] += 1
+        self._remarks[subject].add(reason)
 
     def count(self, what: str) -> None:
-        """Count something that is usual: each report tells the number since the start."""
+        """Count something that is usual: each report has the number since the start."""
         self._counts[what] += 1
 
     def refuse(self, subject: str, reason: str, time: int, taken: int | None) -> None:
-        """Count and remark a sample that a signal refused; the next report tells a replay of it.
+        """Count and remark a sample that a signal refused; the next report lists the first 50 for a replay.
 
         :param time, taken: that of the sample, and that from which it counts, if it was not dropped [ns].
         """
-        self._refused.setdefault(subject, []).append((time, taken))
+        refused = self._refused.setdefault(subject, [])
+        if len(refused) < _MOST_REFUSED:
+            refused.append((time, taken))
         if taken is None:
             self.drop(subject, reason)
         else:
             self.remark(subject, reason)
 
     def note_parameter(self, name: str, value: object) -> None:
-        """Tell in each report that a parameter has another value than its default."""
+        """Report the value of a parameter each time."""
         self._parameters[f"{_PARAMETER}{name}"] = json.dumps(value)
 
     def report(self) -> None:
         """Publish the health, with all remarks since the last report."""
-        remarks, self._remarks = self._remarks, {}
+        remarks, self._remarks = self._remarks, defaultdict(_Remarks)
         standing = dict(self.standing)
         if self.keys and (end := self.keys.warning(datetime.now(UTC))):
             standing["keys"] = end
         counts = {
-            f"{subject}: {why}": n for subject, reasons in remarks.items() for why, n in reasons.items()
+            f"{subject}: {why}": n for subject, found in remarks.items() for why, n in found.counts().items()
         } | {f"{subject}: {why}": 1 for subject, why in standing.items()}
-        if counts.keys() - self._logged:
-            self._node.get_logger().warning("; ".join(sorted(counts)))
-        self._logged = set(counts)
+        causes = {(subject, each) for subject, found in remarks.items() for each in found.causes()}
+        causes |= {(subject, cause(why)) for subject, why in standing.items()}
+        if causes - self._logged:
+            self._node.get_logger().warning(plain("; ".join(sorted(counts))))
+        self._logged = causes
         warnings = [remark + (f" ({n} times)" if n > 1 else "") for remark, n in counts.items()]
         refused, self._refused = self._refused, {}
         now = time.monotonic()
         values = {
-            _PID: os.getpid(),
+            PID: os.getpid(),
             "uptime": f"{now - self._started:.3f}",
-            _PUBLISHED: self._published,
+            PUBLISHED: self._published,
             "dropped": self.dropped,
-            _SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
+            SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
             **({} if self._last_turn_off is None else {_SINCE_TURN_OFF: f"{now - self._last_turn_off:.3f}"}),
             **self.facts,
             **self._counts,
@@ -134,22 +182,26 @@ class HealthReporter:
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if warnings else DiagnosticStatus.OK,
             name=self._node.get_fully_qualified_name(),
-            message="; ".join(warnings) or "running",
+            message="; ".join(warnings)[:_LONGEST_MESSAGE] or "running",
             hardware_id=socket.gethostname(),
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(message)
+        message.header.stamp = stamps.to_message(stamps.now())  # of day: supervision follows no simulation
+        self.publisher.publish(message)
 
-    def _on_period(self) -> None:
+    def on_period(self) -> None:
+        """Report; called each second."""
         beat()  # first: what follows may wait for DDS
         self._before_report()
+        self._of_last_second = self._remarks
         self.report()
 
-    def _on_matched(self, subscribers: Any) -> None:
+    def on_matched(self, subscribers: Any) -> None:
+        """Report to a new subscriber at once; called when a subscriber comes or goes."""
         # Without what comes before a report: a new process has its first output to make.
         if subscribers.current_count_change > 0:
+            self._remarks = defaultdict(_Remarks, {**self._of_last_second, **self._remarks})
             with suppress(InvalidHandle):  # ROS 2's rclpy may call this after the node was destroyed
                 self.report()
 
@@ -165,6 +217,12 @@ def reported_parameters(status: DiagnosticStatus) -> dict[str, Any]:
         return {name: json.loads(value) for name, value in given.items()}
     except RecursionError as error:
         raise ValueError("a parameter is nested too deeply") from error
+
+
+def reported_movement(status: DiagnosticStatus) -> dict[str, Any]:
+    """Return :data:`FASTEST` and :data:`BY_HAND`, as far as a report has them. Raises ValueError."""
+    read: dict[str, Callable[[str], Any]] = {FASTEST: float, BY_HAND: str}
+    return {pair.key: read[pair.key](pair.value) for pair in status.values if pair.key in read}
 
 
 def reported_refusals(status: DiagnosticStatus, subject: str) -> list[tuple[int, int | None]]:
@@ -197,8 +255,16 @@ class Health(NamedTuple):
 
 @contextmanager
 def listening(node: Node, hear: Callable[[DiagnosticArray], None]) -> Iterator[None]:
-    """Call a function with each message of /diagnostics."""
-    subscription = node.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, hear, DIAGNOSTICS.qos)
+    """Call a function with each good message of /diagnostics."""
+    good = reading(DIAGNOSTICS, unreported)["item"]
+
+    def receive(data: bytes) -> None:
+        if message := good(data):
+            hear(message)
+
+    subscription = node.create_subscription(
+        DIAGNOSTICS.type, DIAGNOSTICS.name, receive, DIAGNOSTICS.qos, raw=True
+    )
     try:
         yield
     finally:
@@ -216,7 +282,8 @@ def heard_healths(node: Node) -> Iterator[dict[tuple[str, str], Health]]:
 
     def hear(message: DiagnosticArray) -> None:
         for program, health in healths(message, namespace).items():
-            latest[health.host, program] = health
+            if (health.host, program) in latest or len(latest) < MOST_KNOWN:
+                latest[health.host, program] = health
 
     with listening(node, hear):
         yield latest
@@ -228,7 +295,7 @@ def healths(message: DiagnosticArray, namespace: str) -> dict[str, Health]:
     for status in message.status:
         values = {pair.key: pair.value for pair in status.values}
         prefix, _, program = status.name.rpartition("/")
-        if prefix == namespace and _PUBLISHED in values:
+        if prefix == namespace and PUBLISHED in values:
             with suppress(KeyError, ValueError):  # not a report of ours
                 found[program] = _health(status, values)
     return found
@@ -237,22 +304,10 @@ def healths(message: DiagnosticArray, namespace: str) -> dict[str, Health]:
 def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
     return Health(
         heard=time.monotonic(),
-        pid=int(values[_PID]),
+        pid=whole(values[PID]),
         ok=status.level == DiagnosticStatus.OK,
         reason=status.message,
-        since_output=_age(values.get(_SINCE_OUTPUT)),
-        since_turn_off=_age(values.get(_SINCE_TURN_OFF)),
-        host=status.hardware_id,
+        since_output=age(values.get(SINCE_OUTPUT, "")),
+        since_turn_off=age(values.get(_SINCE_TURN_OFF, "")),
+        host=status.hardware_id[:_LONGEST_HOST],
     )
-
-
-def _age(value: str | None) -> float | None:
-    return seconds(value) if value else None
-
-
-def seconds(value: str) -> float:
-    """Return a time in a report [s]. Raises ValueError for one from which no date can be computed."""
-    found = float(value)
-    if not 0.0 <= found <= LARGEST:  # this refuses NaN
-        raise ValueError(f"{value} is no time")
-    return found

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any, TypeVar
 
+import reactivex as rx
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -15,13 +17,14 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rclpy.parameter import Parameter
-from rclpy.serialization import deserialize_message
 from reactivex import Observable
 
 from interfaces.service.errors import UserError
 from interfaces.service.health import HealthReporter
 from interfaces.service.parameters import Declaration, declarations
-from interfaces.topics import ENGINES, TURN_OFF, Topic
+from interfaces.service.peers import Peers, real_name
+from interfaces.service.reading import not_fresh, reading
+from interfaces.topics import ENGINES, ENGINES_SENDER, TURN_OFF, Sender, Topic
 from reactive_node import ReactiveNode, stamps
 
 T = TypeVar("T")
@@ -45,7 +48,8 @@ class ServiceNode(ReactiveNode):
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create the node of a service; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
-        self._observed: dict[str, Topic] = {}  # by its resolved name
+        self.peers = Peers(self)
+        """The others on its topics and services."""
         self.health = HealthReporter(self, before_report=self._look)
         self.add_on_set_parameters_callback(_only_finite)
 
@@ -61,12 +65,12 @@ class ServiceNode(ReactiveNode):
         name, default, within, unit, meaning, settable = declaration
         description = f"{meaning} [{unit}]" if unit else meaning
         descriptor = ParameterDescriptor(description=description, read_only=not settable)
-        if within is not None and isinstance(default, float):
+        if within is not None and declaration.type is Parameter.Type.DOUBLE:
             descriptor.floating_point_range = [FloatingPointRange(from_value=within[0], to_value=within[1])]
         elif within is not None:
             descriptor.integer_range = [IntegerRange(from_value=within[0], to_value=within[1])]
         value = self.declare_parameter(name, default, descriptor).value
-        # A record tells the parameters of a process by its health. Paths differ from machine to machine.
+        # A record has the parameters of a process in its health. Paths differ from machine to machine.
         if within is not None and value != default and not settable:
             self.health.note_parameter(name, value)
         return value
@@ -110,29 +114,10 @@ class ServiceNode(ReactiveNode):
 
     def _reading(self, topic: Topic, timestamped: bool, max_age: float | None) -> dict[str, Any]:
         """Return the options of an observable of the good values of a topic."""
-        self._observed[self.resolve_topic_name(topic.name)] = topic
-
-        type_, value_of, problem_of = topic.type, topic.value, topic.problem
-        with_time = timestamped or max_age is not None
-
-        def good(received: Any) -> Any:
-            """Return the value of a message. All in one step: every message takes this path."""
-            data = received.value if with_time else received
-            try:
-                value = value_of(deserialize_message(data, type_))
-            except RuntimeError:  # RMWError, which the rclpy of ROS 2 does not export
-                self.health.drop(topic.name, f"{len(data)} octets are no {topic.type_name}")
-                return None
-            problem = problem_of(value)
-            if not problem and max_age is not None:
-                problem = self._staleness(max_age, received.timestamp)
-            if problem:
-                self.health.drop(topic.name, problem)
-                return None
-            return received._replace(value=value) if timestamped else value
-
-        # Raw: rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
-        return {"timestamped": with_time, "item": good, "raw": True}
+        self.peers.reads(topic)
+        staleness = None if max_age is None else partial(self._staleness, max_age)
+        named = replace(topic, name=real_name(self, topic))
+        return reading(named, self.health.drop, timestamped=timestamped, staleness=staleness)
 
     def publish(
         self,
@@ -145,60 +130,75 @@ class ServiceNode(ReactiveNode):
 
         :param on_demand: see :meth:`ReactiveNode.publish_observable`.
         """
-
-        message_of, problem_of = topic.message, topic.problem
-        commands_engines = topic is ENGINES
+        if topic is ENGINES:
+            values = values.share()
+        self.peers.writes(topic)
+        message_of, problem_of, name = topic.message, topic.problem, real_name(self, topic)
 
         def message(value: Any) -> Any:
             if isinstance(value, Rejected):
-                self.health.drop(value.topic.name, value.reason)
+                self.reject(value)
                 return None
             problem = problem_of(value)
             if problem:
-                self.health.drop(topic.name, problem)
+                self.health.drop(name, problem)
                 return None
             self.health.count_output()
-            if commands_engines and value == TURN_OFF:
+            if topic is ENGINES and value == TURN_OFF:
                 self.health.note_turn_off()
             return message_of(value)
 
         self.publish_observable(
             values, topic.type, topic.name, topic.qos, message=message, on_demand=on_demand
         )
+        if topic is ENGINES:  # after the command, which nothing may delay
+            commands = values.filter(lambda it: isinstance(it, str) and not problem_of(it))
+            self.publish(ENGINES_SENDER, commands.map(lambda it: Sender(it, self.get_name())))
+
+    def stating(self, facts: Mapping[str, str], items: Observable[T]) -> Observable[T]:
+        """Return the items; each health report has these facts while they are observed."""
+
+        def begin(_: Any) -> Observable[T]:
+            self.health.facts = facts
+            return items.finally_action(end)
+
+        def end() -> None:
+            self.health.facts = {}
+
+        return rx.defer(begin)
 
     def age(self, stamp: datetime) -> float:
-        """Return how long ago a source time or stamp is [s]; negative if its clock is ahead of the local one.
+        """Return how long ago a DDS source time is [s]; negative if its clock is ahead of the local one.
 
-        Stamps are in the time of day, even while ROS time is simulated. This clock may be set, and differs
-        between hosts: safety takes only the age at arrival from it, and counts on by the Rx clock.
+        It is a time of day, even while ROS time is simulated. This clock may be set, and differs between
+        hosts: safety takes only the age at arrival from it, and counts on by the Rx clock.
         """
         return (stamps.now() - stamp).total_seconds()
 
+    def stamp_age(self, nanoseconds: int) -> float:
+        """Return how long ago the stamp of a header is [s], by ROS time; see :meth:`age`."""
+        return (self.scheduler.time_of_stamps() - nanoseconds) / 1e9
+
     def _staleness(self, max_age: float, stamp: datetime) -> str:
         """Return why a source time is too old [s], or too much ahead; empty if it is neither."""
-        age = self.age(stamp)
-        if abs(age) <= max_age:
-            return ""
-        return f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"
+        return not_fresh(self.age(stamp), max_age, max_age)
+
+    def reject(self, rejected: Rejected) -> None:
+        """Count and report an input that a recipe rejects."""
+        self.health.drop(real_name(self, rejected.topic), rejected.reason)
 
     def remark(self, subject: str, reason: str) -> None:
         self.health.remark(subject, reason)
 
+    def drop(self, name: str, error: Exception) -> None:
+        self.health.drop(name, str(error))
+
     def _look(self) -> None:
         """Remark what is wrong; end the service with its keys, for no other hears it any longer."""
-        self._remark_other_types()
+        for problem in self.peers.problems():
+            self.remark(*problem)
         if (keys := self.health.keys) and (now := datetime.now(UTC)) >= keys.end:
             raise UserError(keys.problem(now))
-
-    def _remark_other_types(self) -> None:
-        """Remark publishers that use an observed topic with another type: nothing arrives from them."""
-        types = dict(self.get_topic_names_and_types())
-        for name, topic in self._observed.items():
-            if types.get(name) == [topic.type_name]:  # to ask for each topic's publishers would cost more
-                continue
-            for publisher in self.get_publishers_info_by_topic(name):
-                if publisher.topic_type != topic.type_name:
-                    self.remark(topic.name, f"{publisher.node_name} publishes {publisher.topic_type}")
 
 
 def _only_finite(parameters: list[Parameter]) -> SetParametersResult:

@@ -24,21 +24,19 @@ from rclpy.executors import Executor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from interfaces.arm_variables import NAMESPACE
+from interfaces.plain_text import plain
 from interfaces.service import enclave, instance, middleware, overrides
 from interfaces.service.errors import UserError
 from interfaces.service.node import ServiceNode
 from reactive_node.executor import create_executor
 
-NAMESPACE = "REACTIVE_ARM_NAMESPACE"
 """Environment variable: the default namespace of every service; ``--ros-args -r __ns:=…`` wins."""
 SUPERVISED = "SUPERVISOR_PROCESS_NAME"
 """Environment variable: the name that supervisord gives to a program."""
 USER_ERRORS = (NameValidationException, ParameterException, UserError)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _SHUTDOWN_TIMEOUT = 0.8  # [s], of the second that a service has to end
-
-_end_of_spin: Future | None = None
-"""A signal completes it. There is none before the service spins."""
 
 
 def run(name: str, wire: Callable[[ServiceNode], None]) -> NoReturn:
@@ -63,11 +61,12 @@ def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
     try:
         chosen = _enclave(name)
         with middleware.without_shared_memory():
+            arguments = [*sys.argv[:1], *middleware.WITHOUT_LOG_FILES, *sys.argv[1:], *chosen]
             # rclpy's handlers would shut DDS down at once, before a last value is published.
-            rclpy.init(args=[*sys.argv, *chosen], signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
         node.health.keys = enclave.keys(chosen[-1]) if chosen else None
-    except (*USER_ERRORS, RuntimeError) as error:  # RuntimeError: of domain, discovery or DDS
+    except (*USER_ERRORS, RuntimeError, UnicodeError) as error:  # of domain, discovery or DDS; no UTF-8
         rclpy.try_shutdown()
         return _refuse(name, error, 2)
     try:
@@ -89,15 +88,15 @@ def _enclave(name: str) -> list[str]:
 
 
 def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
-    global _end_of_spin
-    with instance.claim(node), create_executor() as executor:
+    # The start of an arm has looked for other users; they stop none of its services from coming back.
+    by_hand = SUPERVISED not in os.environ and node.health.keys is None
+    with instance.claim(node, others_count=by_hand), create_executor() as executor:
         try:
             wire(node)
             overrides.check(node, sys.argv[1:])
             executor.add_node(node)
             _wake_at_signals(executor)
-            _end_of_spin = Future()
-            executor.spin_until_future_complete(_end_of_spin)
+            executor.spin_until_future_complete(_end_of_spin())
         except USER_ERRORS:
             raise
         except Exception:
@@ -107,29 +106,36 @@ def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
 
 
 def _refuse(name: str, reason: object, code: int) -> int:
-    print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr)
+    print(f"{name}: {plain(' '.join(str(reason).split()))}", file=sys.stderr)
     return code
 
 
 def handle_signals() -> None:
-    """Handle SIGTERM and Ctrl-C."""
+    """End at SIGTERM and Ctrl-C."""
     for number in _SIGNALS:
-        signal.signal(number, _on_signal)
+        signal.signal(number, _end)
 
 
-def _on_signal(number: int, frame: FrameType | None) -> None:
-    spinning = _end_of_spin
-    if spinning is None or spinning.done():
-        _end()
-    last_resort = threading.Timer(_SHUTDOWN_TIMEOUT, _end)
-    last_resort.daemon = True
-    last_resort.start()
-    spinning.set_result(None)
+def _end_of_spin() -> Future:
+    """Return a future that the next signal completes; one more ends the process on the spot."""
+    end = Future()
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        if end.done():
+            _end()
+        last_resort = threading.Timer(_SHUTDOWN_TIMEOUT, _end)
+        last_resort.daemon = True
+        last_resort.start()
+        end.set_result(None)
+
+    for number in _SIGNALS:
+        signal.signal(number, on_signal)
+    return end
 
 
 def _wake_at_signals(executor: Executor) -> None:
     """Wake the executor at each signal: while the main thread waits in DDS, Python runs no handler."""
-    if (other := signal.set_wakeup_fd(-1)) != -1:
+    if (other := signal.set_wakeup_fd(-1)) != -1:  # Cyclone DDS: its ground wakes the executors itself
         signal.set_wakeup_fd(other)
         return
     reading, writing = os.pipe()
@@ -143,5 +149,5 @@ def _wake_at_signals(executor: Executor) -> None:
     threading.Thread(target=wake, daemon=True).start()
 
 
-def _end() -> NoReturn:
+def _end(*signal: object) -> NoReturn:
     os._exit(0)

@@ -6,6 +6,7 @@ held, and marked so.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from reactivex import Observable
 from interfaces.service.node import ServiceNode
 from interfaces.topics import Topic
 from reactive_node import Timestamp
+from reactive_node.ros_time import in_ros_time
 from reactive_node.sampled_reader import keep_last
 from reactive_node.signals import Refused, Signal, Unchanged, hold, linear
 from reactive_node.stamps import stamped
@@ -25,7 +27,7 @@ GAP = 0.1
 DEPTH = 100
 """
 Samples that may wait while the process is not scheduled: those of 4 s. DDS does not report one that is lost,
-so a replay would hear it.
+and a replay would still have it.
 """
 LIFE_PERIOD = 0.5  # s between two looks for the publishers
 
@@ -35,7 +37,7 @@ def observe_state(node: ServiceNode, topic: Topic, gap: float = GAP) -> Signal[f
 
     :param gap: the longest time between two samples of a movement [s].
     """
-    clock = node.get_clock()
+    ros_time = in_ros_time(node.scheduler)
     every = replace(topic, qos=keep_last(topic.qos, DEPTH))
 
     def refused(sample: Refused) -> None:
@@ -44,11 +46,17 @@ def observe_state(node: ServiceNode, topic: Topic, gap: float = GAP) -> Signal[f
 
     lives = rx.timer(0.0, LIFE_PERIOD).map(lambda _: node.count_publishers(topic.name) > 0)
     return state(
-        node.observe(every, timestamped=True),
-        lives.map(lambda it: stamped(it, clock.now().nanoseconds)),
+        node.observe(every, timestamped=True).map(_not_ahead).pipe(ros_time),
+        lives.map(lambda it: stamped(it, time.time_ns())).pipe(ros_time),
         gap,
         refused,
     )
+
+
+def _not_ahead(sample: Timestamp[float]) -> Timestamp[float]:
+    """Return a sample that counts from now on at the latest: the time of day may have been set back."""
+    now = stamped(sample.value, time.time_ns())
+    return min(sample, now, key=lambda it: it.timestamp)
 
 
 def state(

@@ -27,7 +27,7 @@ def driven(timeline: Events[T] | Sweep, times: Observable[float]) -> Observable[
     """Emit the value at each time of a drive.
 
     While time passes, a value is emitted when it has changed, as by :func:`state`. While time stands still,
-    the value is emitted again and again: a joint that stands tells where.
+    the value is emitted again and again: a joint that stands publishes where.
     """
     samples = times.map(lambda time: (time, timeline.at(time))).filter(lambda sample: sample[1] is not None)
     pairs = samples.start_with((math.nan, None)).pairwise()

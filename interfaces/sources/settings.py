@@ -12,6 +12,7 @@ from reactivex import Observable
 from reactivex.subject import Subject
 
 from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.service.health import BY_HAND
 from interfaces.sources import playback
 from interfaces.sources.settings_file import SettingsFile
 
@@ -69,10 +70,22 @@ class Settings:
             raise UserError(f"{name} was {value!r}: not a float")
         return value
 
-    def remember(self, name: str, value: float) -> None:
-        if self._file.values.get(name) != value:
-            self._file.values[name] = value
-            self._save(name)
+    def remember(self, name: str, value: float) -> bool:
+        """Keep a number for the next process. If that fails, report it, and keep the last one.
+
+        :returns: whether it is kept.
+        """
+        values = self._file.values
+        if values.get(name) == value and self._file.exists:
+            return True
+        self._file.values = {**values, name: value}
+        try:
+            self._file.save()
+        except UserError as error:
+            self._file.values = values
+            self._node.remark(name, f"it stands still, because it cannot be kept: {error}")
+            return False
+        return True
 
     def _declare_again(self, name: str, value: Any) -> None:
         """Replace the value of a parameter, without the event of a parameter that is set by hand."""
@@ -103,6 +116,7 @@ class Settings:
         try:
             self._file.save()
         except UserError as error:
+            self._file.remove()
             self._node.remark(name, f"a restart would forget the setting: {error}")
 
 
@@ -127,8 +141,9 @@ class Setting:
         """
         if self.given_back:
             follows = self._node.create_parameter_observable(self.given_back).distinct_until_changed()
+            by_hand = self._node.stating({BY_HAND: self.name}, self.values)
             return follows.switch_map(
-                lambda follows: (played or rx.just(self._first)) if follows else self.values
+                lambda follows: (played or rx.just(self._first)) if follows else by_hand
             )
         return self.values if self._is_set else playback.follow(self.values, played)
 

@@ -26,28 +26,40 @@ class SettingsFile:
         :raises UserError: for a bad file: forgetting it would not be safe.
         """
         self._path = Path(directory) / f"{service}.yaml" if directory else None
-        self.exists = self._path is None or self._path.exists()
-        """Whether a file tells what was set; nothing is lost where nothing is kept."""
         self.values: dict[str, Any] = {}
         """The settings by name; to be saved after a change."""
         if self._path is not None and self.exists:
+            self._check_owner(self._path.parent)
             self.values = yaml_file.load(self._path)
             if not isinstance(self.values, dict):
                 raise UserError(f"{self._path}: contains no settings; remove it to start afresh")
 
-    def save(self) -> None:
-        """Write the file atomically.
+    @property
+    def exists(self) -> bool:
+        """Whether a file has what was set; nothing is lost where nothing is kept."""
+        return self._path is None or self._path.exists()
 
-        :raises UserError: if that fails; then no file is left, because what it says is not true any more.
-        """
+    def save(self) -> None:
+        """Write the file, atomically. Raises UserError if that fails; then the file is as it was."""
         if self._path is None:
             return
         new = self._path.with_suffix(".new")
         try:
-            self._path.parent.mkdir(exist_ok=True)
+            folder = self._path.parent.resolve()  # a logout may empty /dev/shm (RemoveIPC of logind.conf(5))
+            folder.mkdir(0o700, exist_ok=True)
+            self._check_owner(folder)
             new.write_text(ros_yaml.dump(self.values), encoding="utf-8")
             os.replace(new, self._path)
         except OSError as error:
+            raise UserError(f"{self._path}: {error.strerror}") from error
+
+    def _check_owner(self, folder: Path) -> None:
+        """Raise UserError for the folder of another user, who could press the switch."""
+        if folder.stat().st_uid != os.geteuid():
+            raise UserError(f"{folder}: belongs to another user")
+
+    def remove(self) -> None:
+        """Remove the file: what it says is not true any more."""
+        if self._path is not None:
             with suppress(OSError):
                 self._path.unlink()
-            raise UserError(f"{self._path}: {error.strerror}") from error

@@ -19,6 +19,11 @@ class Events(Generic[T]):
     repeat: float | None = None
     """The period [s] with which all items come again."""
 
+    @property
+    def fastest(self) -> float:
+        """How fast the value changes at most [1/s]."""
+        return math.inf if self.repeat is not None or len(self.items) > 1 else 0.0
+
     def at(self, time: float) -> T | None:
         """Return the value that holds at a time; None before the first one."""
         held = list(itertools.takewhile(lambda item: item[0] <= time, self._around(time)))
@@ -57,6 +62,11 @@ class Sweep:
     """The part of the period [rad] by which the sweep is ahead."""
     rest: float = 0.0
     """How long it stays at each end [s]; less than half the period."""
+
+    @property
+    def fastest(self) -> float:
+        """How fast the value changes at most [1/s]."""
+        return self.amplitude * math.pi / (self.period / 2 - self.rest)
 
     def at(self, time: float) -> float:
         ends, since_end = self._since_end(time)

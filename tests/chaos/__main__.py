@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from deploy.operator.output import use_plain_output
 from deploy.supervision import interruption, processes
 from deploy.supervision.environment import set_middleware
 from deploy.supervision.errors import DeploymentError
@@ -28,7 +29,7 @@ from tests.promises import observations
 from tests.promises.charts import framed, timeline
 from tests.promises.findings import HOLDS, count, overall
 from tests.promises.html_report import html, verdict
-from tests.promises.promises import CHECKERS, overloads
+from tests.promises.promises import checked, overloads
 from tests.promises.text_report import text
 
 KEPT = 10  # records
@@ -36,6 +37,7 @@ KEPT = 10  # records
 
 def main(arguments: Sequence[str]) -> int:
     interruption.install()
+    use_plain_output()
     set_middleware(os.environ)
     options = plan.parse(arguments)
     try:
@@ -93,12 +95,13 @@ def _holds(path: Path, title: str, namespace: str, name: str) -> bool:
     interruption.check()
     history = observations.load(path, namespace)
     findings = []
-    for checker in CHECKERS.values():
+    for finding in checked(history):
         interruption.check()
-        findings.append(checker(history))
+        findings.append(finding)
     overloaded = overloads(history, findings)
-    print("\n" + (f"{namespace}\n" if namespace != "/" else "") + f"{overloaded}\n\n{text(findings)}")
-    faults = count(len(history.injected), "fault")
+    title = f"{namespace}\n" if namespace != "/" else ""
+    print(f"\n{title}{overloaded}\n\n{text(findings, history)}")
+    faults = count(len(history.faults), "fault")
     messages = count(sum(map(len, history.streams.values())), "message")
     recorded = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     remarks = [

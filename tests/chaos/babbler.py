@@ -21,6 +21,7 @@ from geometry_msgs.msg import Point, PointStamped
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import TimeReference
 from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.supervision.environment import namespace_of
@@ -28,8 +29,14 @@ from interfaces import topics
 from interfaces.service import enclave, middleware
 from tests.promises.marks import BABBLER, GARBAGE, TEXT, nan
 
-RATES = {"flood": 10_000.0, "babble": 200.0, "pretend": 2.0}  # Hz; of babble, over all topics
+RATES = {
+    "flood": 10_000.0,
+    "babble": 200.0,
+    "pretend": 2.0,
+    "foretell": 2.0,
+}  # Hz; of babble, over all topics
 PRETENDED_AGE = 1.2  # s of a presence: too old for `turn_on`, young enough to leave the engines on
+FORETOLD = 0.2  # s by which a presence comes from the future: four times the tolerance of A3
 
 _INVALID_STAMPS = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence: too old, and in the future
 
@@ -50,6 +57,8 @@ def _bad_message(topic: topics.Topic, rng: random.Random) -> Any:
         return PointStamped(header=Header(frame_id=TEXT), point=Point(x=nan(topic), y=rng.random()))
     if topic.type is Header:
         return Header(stamp=rng.choice(_INVALID_STAMPS), frame_id=TEXT)
+    if topic.type is TimeReference:
+        return TimeReference(time_ref=Time(sec=-1), source=TEXT)
     contents = {Bool: False, Float64: nan(topic), String: TEXT}
     return topic.type(data=contents[topic.type]) if topic.type in contents else None
 
@@ -75,13 +84,18 @@ def babble(node: Node, rate: float) -> None:
             publisher.publish(nonsense(topic, rng))
 
 
-def pretend(node: Node, rate: float) -> None:
-    """Report at a rate [Hz] that the operator was seen 1.2 s ago."""
+def pretend(node: Node, rate: float, age: float = PRETENDED_AGE) -> None:
+    """Report at a rate [Hz] that the operator was seen so long ago [s]."""
     topic = topics.OPERATOR_PRESENCE
     publisher = node.create_publisher(topic.type, topic.name, topic.qos)
     for _ in _ticks(rate):
-        sec, nanosec = divmod(time.time_ns() - int(PRETENDED_AGE * 1e9), 10**9)
+        sec, nanosec = divmod(time.time_ns() - int(age * 1e9), 10**9)
         publisher.publish(Header(stamp=Time(sec=sec, nanosec=nanosec), frame_id=TEXT))
+
+
+def foretell(node: Node, rate: float) -> None:
+    """Report at a rate [Hz] that the operator will be seen in 0.2 s."""
+    pretend(node, rate, -FORETOLD)
 
 
 def _ticks(rate: float) -> Iterator[None]:
@@ -99,10 +113,12 @@ def run(mode: str, rate: float) -> None:
     with middleware.without_shared_memory():
         namespace = namespace_of(os.environ)
         rclpy.init(
-            args=enclave.arguments(BABBLER, namespace), signal_handler_options=SignalHandlerOptions.NO
+            args=[*middleware.WITHOUT_LOG_FILES, *enclave.arguments(BABBLER, namespace)],
+            signal_handler_options=SignalHandlerOptions.NO,
         )  # a signal ends it without clean-up
         node = Node(f"{BABBLER}_{os.getpid()}", namespace=namespace)
-    {"flood": flood, "babble": babble, "pretend": pretend}[mode](node, rate)
+    modes = {"flood": flood, "babble": babble, "pretend": pretend, "foretell": foretell}
+    modes[mode](node, rate)
 
 
 if __name__ == "__main__":

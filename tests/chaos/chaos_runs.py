@@ -12,7 +12,7 @@ from tests.environment import user_environment
 from tests.promises import observations
 from tests.promises.findings import Finding
 from tests.promises.history import History
-from tests.promises.promises import CHECKERS
+from tests.promises.promises import checked
 
 TIMEOUT = 150.0  # s
 
@@ -23,7 +23,7 @@ class ChaosRun:
         self.code = code
         self.report = next(directory.glob(f"chaos/*/report{file_suffix(namespace)}.html"))
         self.history: History = observations.load(self.report.with_name("record.mcap"), namespace)
-        self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
+        self.findings: dict[str, Finding] = {each.promise: each for each in checked(self.history)}
         self.left_in_shared_memory: set[Path] = set()
 
     def finding(self, promise: str) -> Finding:

@@ -30,7 +30,7 @@ from deploy.supervision.recorder import Recorder, clocks, record
 from interfaces.service import UserError, enclave, middleware
 from reactive_node import ReactiveNode
 from tests.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
-from tests.promises.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
+from tests.promises.history import LOSS, OVERLOAD, Condition, Life
 from tests.promises.marks import is_babble
 from tests.promises.observations import FAULTS, PROCESSES
 
@@ -67,7 +67,7 @@ def _recording(
     try:
         with middleware.without_shared_memory():
             rclpy.init(
-                args=enclave.arguments(OBSERVER, namespace),
+                args=[*middleware.WITHOUT_LOG_FILES, *enclave.arguments(OBSERVER, namespace)],
                 context=context,
                 domain_id=domain,
                 signal_handler_options=SignalHandlerOptions.NO,
@@ -117,7 +117,7 @@ def main(arguments: list[str]) -> int:
         write(PROCESSES, life._asdict() | {"namespace": namespace}, "began", "ended")
 
     def blind(kind: str, begin: float, end: float) -> None:
-        write(FAULTS, InjectedFault(kind, NO_TARGET, begin, end)._asdict(), "begin", "end")
+        write(FAULTS, Condition(kind, begin, end)._asdict(), "begin", "end")
 
     lost, overload = partial(blind, LOSS), partial(blind, OVERLOAD)
     monitor = ProcessMonitor({Path(run): namespace for namespace, _, run in arms}, report, overload)

@@ -97,6 +97,11 @@ def _delete_abandoned() -> None:
                 _ip("netns", "delete", name)
 
 
+def set_port(bridge: str, host: str, *how: str) -> None:
+    """Set a host's port of the bridge, such as ``down``."""
+    _ip("-n", bridge, "link", "set", host, *how)
+
+
 def _ip(*arguments: str) -> str:
     return subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True).stdout
 
@@ -154,11 +159,11 @@ class TwoHosts(Testbed):
 
     def _cut(self, arm: RealArm, target: str) -> Undo:
         """Take the operator's port of the bridge down; at the end, up again."""
-        _ip("-n", self._full(BRIDGE), "link", "set", CONTROL, "down")
+        set_port(self._full(BRIDGE), CONTROL, "down")
 
         def heal() -> None:
             with suppress(subprocess.CalledProcessError):
-                _ip("-n", self._full(BRIDGE), "link", "set", CONTROL, "up")
+                set_port(self._full(BRIDGE), CONTROL, "up")
 
         return heal
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from deploy.supervision import parameter_file
 from deploy.supervision.errors import DeploymentError
 from reactive_node.domains import DOMAINS
-from tests.chaos import clock, partition, schedule, schedule_file
+from tests.chaos import clock, partition, schedule, schedule_file, second_host
 from tests.chaos.faults import FAULT_KINDS
 from tests.chaos.schedule import Schedule
 from tests.chaos.testbed import SCENARIO, Testbed, sources
@@ -20,7 +20,14 @@ from tests.promises import marks
 
 RANDOM = "monkey"  # the scenario of random faults
 FLEET_RATE = 10.0  # Hz, of each source; many arms share the machine
-NAMED = (*partition.SCHEDULES, *schedule.SCENARIOS)
+HOSTS: dict[str, tuple[Schedule, float, Callable[..., Testbed]]] = {
+    **{
+        name: (planned, partition.LENGTH, partition.TwoHosts) for name, planned in partition.SCHEDULES.items()
+    },
+    "second_host": (second_host.SCHEDULE, second_host.LENGTH, second_host.SecondHost),
+}
+"""The scenarios of two hosts."""
+NAMED = (*HOSTS, *schedule.SCENARIOS)
 
 
 class Plan(NamedTuple):
@@ -60,7 +67,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if not 1 <= options.arms <= len(DOMAINS):
         parser.error(f"--arms must be from 1 to {len(DOMAINS)}: each arm needs a ROS domain")
-    if options.arms > 1 and options.scenario in partition.SCHEDULES:
+    if options.arms > 1 and options.scenario in HOSTS:
         parser.error(f"--scenario {options.scenario} allows only one arm")
     if options.schedule and (options.scenario != RANDOM or options.arms > 1 or options.parameters):
         parser.error("--schedule has faults and parameters of its own, for one arm")
@@ -77,17 +84,18 @@ def plan(options: argparse.Namespace) -> Plan:
 
 
 def _faults_and_arms(options: argparse.Namespace) -> Plan:
-    if options.scenario in partition.SCHEDULES:
+    if options.scenario in HOSTS:
         if reason := partition.missing(options.scenario):
             raise DeploymentError(f"{options.scenario} is not possible on this machine: {reason}")
-        title = f"Scenario {options.scenario}: the network between the operator's host and the robot's"
-        return Plan(title, [partition.SCHEDULES[options.scenario]], partition.LENGTH, partition.TwoHosts)
+        title = f"Scenario {options.scenario}: the network between two hosts"
+        faults, seconds, hosts = HOSTS[options.scenario]
+        return Plan(title, [faults], seconds, hosts)
     if options.schedule:
         return _scheduled(options.schedule)
     several = f", {options.arms} arms" if options.arms > 1 else ""
     testbed = _fleet(options.arms) if options.arms > 1 else Testbed
     if options.scenario != RANDOM:
-        planned = schedule.SCENARIOS[options.scenario]()
+        planned = schedule.possible(schedule.SCENARIOS[options.scenario]())
         length = schedule.duration(planned)
         title = f"Scenario {options.scenario}, {length:.0f} s{several}"
         return Plan(title, [planned] * options.arms, length, testbed)
@@ -97,6 +105,9 @@ def _faults_and_arms(options: argparse.Namespace) -> Plan:
     if not planned:
         raise DeploymentError("No fault is planned: the time is too short")
     title = f"Random faults, seed {seed}, {options.minutes:g} min{several}"
+    every, planned = len(planned), schedule.possible(planned)
+    if left_out := every - len(planned):  # the others are those of each machine
+        title += f", {left_out} of {marks.STEP} left out: {clock.missing()}"
     return Plan(title, [planned[arm :: options.arms] for arm in range(options.arms)], length, testbed)
 
 

@@ -69,7 +69,7 @@ class ProcessMonitor:
             os.close(handle)
 
     def scan(self) -> None:
-        pids = {int(name) for name in os.listdir("/proc") if name.isdigit()}
+        pids = set(processes.all_pids())
         now = time.monotonic()
         self._pending |= dict.fromkeys(pids - self._known, now)
         self._known = pids

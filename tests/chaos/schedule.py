@@ -8,8 +8,9 @@ import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from tests.chaos.faults import FAULT_KINDS
-from tests.promises.history import ALL, NO_TARGET, PROGRAMS
+from tests.chaos import clock
+from tests.chaos.faults import FAULT_KINDS, PROGRAMS
+from tests.promises.history import ALL, NO_TARGET
 from tests.promises.limits import HUNG
 from tests.promises.marks import STEP
 
@@ -56,6 +57,11 @@ def random_faults(
         lasting = rng.uniform(*table[kind].duration)
         planned.append(PlannedFault(round(at, 3), kind, rng.choice(table[kind].targets), round(lasting, 3)))
     return planned
+
+
+def possible(planned: Schedule) -> Schedule:
+    """Return the faults that this machine can have."""
+    return [each for each in planned if each.kind != STEP or not clock.missing()]
 
 
 def kill_each(times: int = 20) -> Schedule:
@@ -160,7 +166,7 @@ def variously() -> Schedule:
     own = [program for program in ROUND if program not in killed]  # of `make new-service`
     begin = planned[-1].at + HUNG + PAUSE  # before, kill_all explains each silence
     planned += [PlannedFault(begin + PAUSE * n, "kill", program) for n, program in enumerate(own)]
-    return [each for each in planned if each.kind in FAULT_KINDS]
+    return planned
 
 
 def everything() -> Schedule:

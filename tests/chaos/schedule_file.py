@@ -6,6 +6,7 @@
     length: 45.0                                          # s
     parameters: {}                                        # as in a parameter file, nodes by full names
     scenario: {l1: {...}, operator: {...}, engines: ...}  # as in a scenario file
+    second: {operator: ...}                               # of an arm on another host, if there is one
     faults:
       - {at: 5.0, kind: kill, target: kinematics, duration: 0.0}
 """
@@ -13,13 +14,14 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
+import ros_yaml
 
 from deploy.supervision.errors import DeploymentError
 from tests.chaos.schedule import PlannedFault, Schedule
@@ -37,6 +39,8 @@ class Experiment:
     faults: Schedule
     parameters: Mapping[str, Any] = field(default_factory=dict)
     """The content of a parameter file of the services."""
+    second: Mapping[str, Any] | None = None
+    """The scenario of a second arm on another host, if there is one (`make simulate` with --two-hosts)."""
 
 
 def save(experiment: Experiment, path: Path) -> None:
@@ -45,23 +49,25 @@ def save(experiment: Experiment, path: Path) -> None:
         "length": experiment.length,
         "parameters": dict(experiment.parameters),
         "scenario": dict(experiment.scenario),
+        **({"second": dict(experiment.second)} if experiment.second else {}),
         "faults": [each._asdict() for each in experiment.faults],
     }
-    path.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None), encoding="utf-8")
+    path.write_text(ros_yaml.dump(document, default_flow_style=None), encoding="utf-8")
 
 
 def load(path: Path) -> Experiment:
     """Read an experiment from a file. Raises DeploymentError: one line with the file and the reason."""
     try:
-        document: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document: Any = ros_yaml.read(path)
         scenario = _checked(document, "scenario", dict, "mapping")
         faults = [_fault(each) for each in _checked(document, "faults", list, "list")]
         length = _seconds("length", document["length"])
         parameters = _checked({"parameters": {}} | document, "parameters", dict, "mapping")
-        return Experiment(str(document["seed"]), length, scenario, faults, parameters)
+        second = _checked(document, "second", dict, "mapping") if "second" in document else None
+        return Experiment(str(document["seed"]), length, scenario, faults, parameters, second)
     except OSError as error:
         raise DeploymentError(f"{path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise DeploymentError(f"{path} is no schedule: {reason}") from None
 
@@ -77,7 +83,7 @@ def _checked(content: Any, key: str, kind: type, name: str) -> Any:
     """Return a value of a type. Raises ValueError."""
     value = content[key]
     if not isinstance(value, kind):
-        raise ValueError(f"{key}: {value!r} is no {name}")
+        raise ValueError(f"{key}: {reprlib.repr(value)} is no {name}")
     return value
 
 
@@ -86,4 +92,4 @@ def _seconds(key: str, value: Any) -> float:
     with suppress(TypeError, ValueError, OverflowError):
         if 0.0 <= (seconds := float(value)) < math.inf:
             return seconds
-    raise ValueError(f"{key}: {value!r} is no time in s")
+    raise ValueError(f"{key}: {reprlib.repr(value)} is no time in s")

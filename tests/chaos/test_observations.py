@@ -20,7 +20,7 @@ from deploy.supervision import processes
 from deploy.supervision.recorder import Recorder, qos_profiles
 from interfaces import topics
 from tests.chaos import __main__ as chaos
-from tests.promises.history import NO_TARGET, OVERLOAD, InjectedFault, Life
+from tests.promises.history import NO_TARGET, OVERLOAD, Condition, InjectedFault, Life
 from tests.promises.marks import STEP
 from tests.promises.observations import FAULTS, PROCESSES, load, values
 
@@ -56,6 +56,28 @@ def judge(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -
     monkeypatch.setattr(chaos.interruption, "install", lambda: None)
     monkeypatch.setattr(chaos, "set_middleware", lambda environment: None)
     return lambda record: Judged(chaos.main(["--replay", str(record)]), *capsys.readouterr())
+
+
+EVENT = '{{"namespace": "/", "program": "x", "pid": {pid}, "began": {began}, "ended": null}}'
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        *("", "[]", "{}", '{"namespace": "/", "x": 1}', "[" * 100_000, "9" * 9_999),
+        EVENT.format(pid='"<script>"', began=0),
+        EVENT.format(pid=7, began='"0"'),
+        EVENT.format(pid=7, began="null"),
+    ],
+)
+def test_record_of_others_is_refused_in_one_line(event: str, tmp_path: Path, judge: Judge) -> None:
+    record = tmp_path / "record.mcap"
+    recorder = Recorder(record, 0, 10**18)
+    recorder.message(PROCESSES, "std_msgs/msg/String", "", serialize_message(String(data=event)), 0, 0)
+    recorder.close()
+    code, _, errors = judge(record)
+    assert code == 1
+    assert re.fullmatch(f"Record {record}: it is none of make chaos: .*\n", errors)
 
 
 @pytest.mark.parametrize("pid", ["none", "", "1" * 5000])
@@ -133,7 +155,9 @@ def test_times_of_a_stepped_arm_are_those_of_the_machine(tmp_path: Path) -> None
     assert [speed.sent for speed in speeds] == pytest.approx(range(10), abs=1e-6)
 
 
-def overloads_of(path: Path, lateness: float, *events: Life | InjectedFault) -> list[tuple[float, float]]:
+def overloads_of(
+    path: Path, lateness: float, *events: Life | InjectedFault | Condition
+) -> list[tuple[float, float]]:
     """Record a speed each second, the one of second 10 late by ``lateness`` [s]; return the overloads."""
     recorder = Recorder(path, 0, 10**18)
     for event in events:
@@ -145,8 +169,8 @@ def overloads_of(path: Path, lateness: float, *events: Life | InjectedFault) -> 
         received = sent + (int(lateness * 1e9) if second == 10 else 2_000_000)
         recorder.message("/effector/speed", topics.EFFECTOR_SPEED.type_name, "", data, received, sent)
     recorder.close()
-    found = (fault for fault in load(path).faults if fault.kind == OVERLOAD)
-    return [(round(fault.begin, 6), round(fault.end, 6)) for fault in found]
+    found = (each for each in load(path).conditions if each.kind == OVERLOAD)
+    return [(round(each.begin, 6), round(each.end, 6)) for each in found]
 
 
 @pytest.mark.parametrize(
@@ -167,13 +191,13 @@ def test_late_reception_is_an_overload(
         (InjectedFault("partition", "operator", 5.0, 9.0), 0),
         (InjectedFault("partition", "operator", 10.6, 11.0), 1),
         (InjectedFault("bad_line", "operator", 5.0, 12.0), 0),
-        (InjectedFault("loss", NO_TARGET, 0.0, 30.0), 0),  # --loss
-        (InjectedFault("loss", NO_TARGET, 9.0, 11.0), 1),  # part of the overload
+        (Condition("loss", 0.0, 30.0), 0),  # --loss
+        (Condition("loss", 9.0, 11.0), 1),  # part of the overload
         (InjectedFault("stop", "velocity", 9.0, 11.0), 1),
     ],
 )
 def test_late_reception_by_discovery_or_network_is_no_overload(
-    event: Life | InjectedFault, number: int, tmp_path: Path
+    event: Life | InjectedFault | Condition, number: int, tmp_path: Path
 ) -> None:
     assert len(overloads_of(tmp_path / "record.mcap", 0.5, event)) == number
 
@@ -219,7 +243,7 @@ def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path, jud
 
 @pytest.mark.parametrize(
     ("seconds", "code", "verdict"),
-    [(20, 0, "All exercised promises hold"), (0, 1, "No promise was exercised")],
+    [(20, 0, "No promise is violated, but "), (0, 1, "No promise was exercised")],
 )
 def test_exit_code_is_0_if_promises_are_known_to_hold(
     seconds: int, code: int, verdict: str, tmp_path: Path, judge: Judge
@@ -228,7 +252,7 @@ def test_exit_code_is_0_if_promises_are_known_to_hold(
     recorded(path, ONE, seconds=seconds)
     judged = judge(path)
     assert judged.code == code
-    assert f"\n{verdict}\nReport: " in judged.output
+    assert f"\n{verdict}" in judged.output
 
 
 @pytest.mark.parametrize(

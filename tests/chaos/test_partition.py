@@ -9,15 +9,16 @@ from pathlib import Path
 import pytest
 
 from deploy.supervision import processes
+from deploy.supervision.system import System
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 from tests.chaos.partition import missing, namespaces
 from tests.promises.findings import HOLDS
 from tests.promises.history import History, InjectedFault, between
+from tests.promises.lateness import REDISCOVERY
 from tests.promises.promises import CHECKERS
 
 from .chaos_runs import chaos_run
 
-DISCOVERY = 10.0  # s until a lost host is discovered again
 pytestmark = [pytest.mark.timed, pytest.mark.timeout(120)]
 
 
@@ -48,7 +49,7 @@ def test_heartbeats_resume_soon_after_the_network(history: History, cut: Injecte
     heartbeats = history.stream(OPERATOR_HEARTBEAT)
     # By the time of reception: the kernel may keep a packet whose address it does not know for seconds.
     assert not [heartbeat for heartbeat in heartbeats if cut.begin + 0.5 < heartbeat.received < cut.end]
-    assert between(heartbeats, cut.end, cut.end + DISCOVERY)
+    assert between(heartbeats, cut.end, cut.end + REDISCOVERY)
 
 
 def test_engines_stay_off_after_a_partition_heals(history: History, cut: InjectedFault) -> None:
@@ -103,6 +104,7 @@ def test_next_start_cleans_up_after_a_killed_chaos_monkey(tmp_path: Path) -> Non
     assert f"arm{monkey.pid}-switch" in hosts()
     with namespaces():
         assert not [name for name in hosts() if name.startswith(f"arm{monkey.pid}-")]
+    System(tmp_path / "run_operator").stop()  # as the next make chaos does
 
 
 def hosts() -> list[str]:

@@ -65,6 +65,22 @@ def test_a_step_of_the_clock_without_libfaketime_is_refused(tmp_path: Path) -> N
     assert str(error.value) == NEEDED
 
 
+def test_a_seed_plans_the_same_faults_without_libfaketime(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(clock, "missing", lambda: "")
+    options = plan.parse(["--minutes", "10", "--seed", "7"])
+    (complete,) = plan.plan(options).schedules
+    monkeypatch.undo()
+    request.getfixturevalue("without_library")
+    title, (possible,), *_ = plan.plan(options)
+
+    assert possible == [each for each in complete if each.kind != "step_clock"]
+    steps = len(complete) - len(possible)
+    assert steps
+    assert title.endswith(f"{steps} of step_clock left out: {NEEDED.partition(': ')[2]}")
+
+
 def test_only_a_step_of_the_clock_needs_libfaketime() -> None:
     plans = [
         plan.Plan("", [[PlannedFault(5.0, kind, "nothing")]], 1.0, Testbed)

@@ -6,9 +6,10 @@ import pytest
 
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 from tests.chaos.clock import missing
+from tests.chaos.faults import PROGRAMS
 from tests.promises.effects import TRANSPORT
 from tests.promises.findings import HOLDS
-from tests.promises.history import PROGRAMS, SILENCE, Sample, between, running
+from tests.promises.history import OVERLOAD, SILENCE, Sample, between, running
 from tests.promises.marks import STEP
 from tests.promises.promises import CHECKERS
 
@@ -34,7 +35,7 @@ def test_killed_program_is_back_within_two_seconds(run: ChaosRun, program: str) 
 
 def test_engines_turn_off_in_time_with_a_stopped_controller(run: ChaosRun) -> None:
     history = run.history
-    sleep = next(fault for fault in history.faults if fault.kind == SILENCE and fault.begin > 0.0)
+    sleep = next(each for each in history.conditions if each.kind == SILENCE and each.begin > 0.0)
     begin = between(history.stream(OPERATOR_HEARTBEAT), 0.0, sleep.begin + 1.0)[-1].sent
     off = max(off for on, off in running(history) if on < sleep.end)
     stop = next(f for f in history.faults if (f.kind, f.target) == ("stop", "engine_controller"))
@@ -44,7 +45,10 @@ def test_engines_turn_off_in_time_with_a_stopped_controller(run: ChaosRun) -> No
 
 
 def test_hung_programs_and_a_stopped_sentinel_are_replaced(run: ChaosRun) -> None:
-    assert set(run.finding("L4").times) == {"kinematics", "config_l1", "sentinel"}
+    found = run.finding("L4")
+    overloaded = any(each.kind == OVERLOAD for each in run.history.conditions)
+    assert found.times.keys() <= {"kinematics", "config_l1", "sentinel"}
+    assert len(found.times) + (found.unknown if overloaded else 0) >= 3
 
 
 @pytest.mark.skipif(bool(missing()), reason=f"platform: {missing()}")
@@ -78,12 +82,12 @@ def test_exit_code_output_and_page_show_cost_and_verdict(run: ChaosRun) -> None:
     assert run.code == 0, run.output
     assert f") in {len(PROGRAMS) + 1} processes per arm" in run.output
     page = run.report.read_text(encoding="utf-8")
-    assert "All exercised promises hold" in page
+    assert "<h1 class=violated>" not in page
     assert page.count("<svg") >= 2
     page = page.replace("http://www.w3.org/2000/svg", "")  # a name, not an address
     assert not any(word in page for word in ("http:", "https:", "src="))
 
 
 def test_killed_processes_leave_nothing_in_shared_memory(run: ChaosRun) -> None:
-    assert {kill.kind for kill in run.history.injected} >= {"kill", "kill_all", "kill_supervisor"}
+    assert {kill.kind for kill in run.history.faults} >= {"kill", "kill_all", "kill_supervisor"}
     assert not run.left_in_shared_memory

@@ -5,8 +5,7 @@ from itertools import pairwise
 import pytest
 
 from tests.chaos import schedule
-from tests.chaos.faults import FAULT_KINDS
-from tests.promises.history import PROGRAMS
+from tests.chaos.faults import FAULT_KINDS, PROGRAMS
 from tests.promises.limits import HUNG, MEDIAN
 
 

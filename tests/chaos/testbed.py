@@ -26,7 +26,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import yaml
+import ros_yaml
 
 from deploy.security import rights
 from deploy.security.keystore import Keystore
@@ -40,16 +40,14 @@ from interfaces.service import enclave
 from reactive_node.domains import reserved_domain
 from tests.chaos import clock
 from tests.chaos.arm import RealArm, file_suffix
-from tests.chaos.faults import FAULT_KINDS, INJECTED, Undo
+from tests.chaos.faults import FAULT_KINDS, INJECTED, PROGRAMS, Undo
 from tests.chaos.observer import OBSERVER
 from tests.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
 from tests.promises.history import (
     LOSS,
-    NO_TARGET,
-    OPERATOR,
     OUTPUTS,
-    PROGRAMS,
     SILENCE,
+    Condition,
     InjectedFault,
     target_name,
 )
@@ -208,22 +206,22 @@ class Testbed:
         self._record(InjectedFault(kind, target, now, now + duration, pid, arm.clock.ahead), arm)
         return (now + duration, undo) if undo else None
 
-    def _record(self, fault: InjectedFault, arm: RealArm) -> None:
+    def _record(self, what: InjectedFault | Condition, arm: RealArm) -> None:
         assert self._observer.stdin is not None
-        self._observer.stdin.write(json.dumps(fault._asdict() | {"namespace": arm.namespace}) + "\n")
+        self._observer.stdin.write(json.dumps(what._asdict() | {"namespace": arm.namespace}) + "\n")
         self._observer.stdin.flush()
 
     def _report_conditions(self, begin: float, duration: float) -> None:
         """Let the observer record the packet loss and the operator's sleep: the checkers have to know."""
         conditions = []
         if self._loss:
-            conditions.append(InjectedFault(LOSS, NO_TARGET, self.epoch - self.lead, begin + duration))
+            conditions.append(Condition(LOSS, self.epoch - self.lead, begin + duration))
         pressed, day = self.scenario["operator"]["pressed"][-1], self.scenario.get("repeat")
         if day and "to" in pressed:
             # A day may begin at `begin`, but for the error of floating point.
             first, last = (int((time - self.epoch + 0.001) // day) for time in (begin, begin + duration))
             for morning in (self.epoch + number * day for number in range(first, last + 1)):
-                asleep = InjectedFault(SILENCE, OPERATOR, morning + pressed["to"], morning + day)
+                asleep = Condition(SILENCE, morning + pressed["to"], morning + day)
                 conditions.append(asleep)
         for arm, condition in itertools.product(self.arms, conditions):
             self._record(condition, arm)
@@ -231,7 +229,7 @@ class Testbed:
     def _parameters(self) -> dict[str, Any]:
         """Return the parameters of all arms, with an origin of the scenario that they share."""
         scenario = self._directory / "scenario.yaml"
-        scenario.write_text(yaml.safe_dump(dict(self.scenario)))
+        scenario.write_text(ros_yaml.dump(dict(self.scenario)))
         self.epoch = time.monotonic() + self.lead
         return scenario_parameters(scenario, round(self.epoch, 3))
 

@@ -52,7 +52,7 @@ def test_host_with_a_wrong_clock_is_refused(age: float, words: str) -> None:
         heard(*3 * [report("/sentinel_operator", "desk", age=age)]).check({})
 
 
-def test_least_age_of_a_report_tells_the_clock() -> None:
+def test_least_age_of_a_report_shows_the_clock() -> None:
     hosts = heard(*(report("/sentinel_operator", "desk", age=age) for age in (0.3, 0.001, 0.2)))
     hosts.check({})
     assert hosts.clocks() in [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import socket
+import time
 from functools import partial
 from typing import Any
 
@@ -25,29 +26,29 @@ def report(age: float, host: str = "desk", name: str = "/dead_mans_switch") -> D
 heard = partial(health_reports.heard, Clocks)
 
 
-def test_least_age_of_three_reports_tells_the_clock() -> None:
-    assert heard(report(9.0), report(7.0)).behind() == {}
-    assert heard(report(9.0), report(7.0), report(8.0)).behind() == {"desk": pytest.approx(7.0, abs=0.5)}
+def test_least_age_of_three_reports_shows_the_clock() -> None:
+    assert heard(report(9.0), report(7.0)).differences() == {}
+    assert heard(report(9.0), report(7.0), report(8.0)).differences() == {"desk": pytest.approx(7.0, abs=0.5)}
 
 
 @pytest.mark.parametrize("namespace", ["/arm1", "/X/"])
 def test_hosts_of_an_arm_in_a_namespace_are_known(namespace: str) -> None:
     name = f"{namespace.rstrip('/')}/velocity"
-    assert heard(*(report(9.0, name=name) for _ in range(3)), namespace=namespace).behind()
+    assert heard(*(report(9.0, name=name) for _ in range(3)), namespace=namespace).differences()
 
 
 @pytest.mark.parametrize("others", [{"host": socket.gethostname()}, {"host": ""}, {"name": "/arm2/velocity"}])
 def test_this_host_and_those_of_other_arms_are_no_other_hosts(others: dict[str, str]) -> None:
-    assert heard(*(report(9.0, **others) for _ in range(3))).behind() == {}
+    assert heard(*(report(9.0, **others) for _ in range(3))).differences() == {}
 
 
 def test_host_that_has_not_reported_for_three_seconds_has_no_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     found = heard(*(report(9.0) for _ in range(3)))
     now = clocks.time.monotonic()
     monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 2.9)
-    assert found.behind()
+    assert found.differences()
     monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 3.1)
-    assert found.behind() == {}
+    assert found.differences() == {}
 
 
 @pytest.mark.parametrize(
@@ -65,18 +66,18 @@ def test_clock_that_differs_by_more_than_the_tolerance_is_a_problem(age: float, 
 @pytest.mark.parametrize(
     ("behind", "words"), [(0.9, "900 ms behind"), (0.0, "0 ms ahead of"), (-1.0, "1.0 s ahead of")]
 )
-def test_difference_is_told_in_words(behind: float, words: str) -> None:
+def test_difference_is_given_in_words(behind: float, words: str) -> None:
     assert clocks.difference("desk", behind) == f"the clock of host desk is {words} ours"
 
 
 def test_reported_clock_is_one_of_the_arm_and_a_number() -> None:
-    def told(value: str) -> DiagnosticArray:
+    def report(value: str) -> DiagnosticArray:
         values = [KeyValue(key="clock of host desk", value=value)]
         status = DiagnosticStatus(name="/arm1/engine_controller", hardware_id="robot1", values=values)
         return DiagnosticArray(status=[status])
 
-    assert clocks.reported(told("0.5"), "/arm1") == {"desk": (0.5, "robot1")}
-    assert clocks.reported(told("?"), "/arm1") == {}
+    assert clocks.reported(report("0.5"), "/arm1") == {"desk": (0.5, "robot1")}
+    assert clocks.reported(report("?"), "/arm1") == {}
 
 
 @pytest.mark.parametrize(("age", "problem"), [(9.0, "clocks: the clock of host desk is"), (0.0, "")])
@@ -85,16 +86,21 @@ def test_service_reports_the_clocks(
 ) -> None:
     monkeypatch.setenv(manifest.HOST, "robot")
     node: ServiceNode = make_node("service", kind=ServiceNode)
-    found = clocks.observe(node)
+    refusals: list[str] = []
+    clocks.observe(node).subscribe(refusals.append, scheduler=node.scheduler)
     published: list[Any] = []
     publisher = make_node("desk").create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
 
     def is_known() -> bool:
         publisher.publish(report(age))
-        return bool(found.behind())
+        return "clock of host desk" in "".join(node.health.facts)
 
     spin_until(is_known)
-    monkeypatch.setattr(node.health._publisher, "publish", published.append)
+    waiting = "the clocks of the hosts are not compared yet"
+    spin_until(
+        lambda: refusals == [waiting, "the clock of host desk is more than 50 ms behind ours" if age else ""]
+    )
+    monkeypatch.setattr(node.health.publisher, "publish", published.append)
     node.health.report()
     assert published[0].status[0].message.startswith(problem or "running")
     assert "clock of host desk" in [pair.key for pair in published[0].status[0].values]
@@ -107,22 +113,23 @@ def test_service_of_a_single_host_hears_no_reports(
 ) -> None:
     monkeypatch.delenv(manifest.HOST, raising=False)
     node: ServiceNode = make_node("service", kind=ServiceNode)
-    found = clocks.observe(node)
+    refusals: list[str] = []
+    clocks.observe(node).subscribe(refusals.append, scheduler=node.scheduler)
     assert DIAGNOSTICS.name not in [each.topic_name for each in node.subscriptions]
-    assert found.objection() == ""
+    assert refusals == []
 
 
 def test_engines_wait_for_the_first_comparison_of_the_clocks(
-    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
+    make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now = clocks.time.monotonic()
-    monkeypatch.setattr(clocks.time, "monotonic", lambda: now)
+    begin = time.monotonic()
     monkeypatch.setenv(manifest.HOST, "robot")
-    found = clocks.observe(make_node("service", kind=ServiceNode))
-    monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 2.9)
-    assert found.objection() == "the clocks of the hosts are not compared yet"
-    monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 3.0)
-    assert found.objection() == ""  # no other host runs
+    node: ServiceNode = make_node("service", kind=ServiceNode)
+    refusals: list[str] = []
+    clocks.observe(node).subscribe(refusals.append, scheduler=node.scheduler)
+    assert refusals == ["the clocks of the hosts are not compared yet"]
+    spin_until(lambda: refusals[1:] == [""])  # no other host runs
+    assert time.monotonic() - begin >= 3.0
 
 
 @pytest.mark.parametrize(
@@ -132,6 +139,6 @@ def test_first_comparison_ends_the_wait(age: float, words: str) -> None:
     found = Clocks("/")
     found.awaited_until = math.inf
     for _ in range(3):
-        assert found.objection() == "the clocks of the hosts are not compared yet"
+        assert found.refusal() == "the clocks of the hosts are not compared yet"
         found.hear(report(age))
-    assert found.objection() == words
+    assert found.refusal() == words

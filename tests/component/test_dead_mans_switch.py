@@ -10,10 +10,19 @@ from rclpy.parameter import Parameter
 from reactivex.testing import ReactiveTest, TestScheduler
 from std_msgs.msg import String
 
-from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_OFF, TURN_ON
-from reactive_node.testing import MakeNode, SpinFor, SpinUntil
+from interfaces.topics import (
+    ENGINES,
+    ENGINES_STATE,
+    OFF,
+    ON,
+    OPERATOR_HAND,
+    OPERATOR_HEARTBEAT,
+    TURN_OFF,
+    TURN_ON,
+)
+from reactive_node.testing import SpinFor, SpinUntil
 from services.dead_mans_switch import engine_commands, heartbeats, wire
-from tests.component.wiring import Wired
+from tests.component.wiring import Connect, Wired
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe
 
@@ -47,6 +56,14 @@ def test_command_is_repeated_until_the_engines_obey(scheduler: TestScheduler) ->
     assert states.subscriptions == [subscribe(210, 242), subscribe(300, 305)]
 
 
+def test_command_that_is_not_obeyed_comes_ten_times_in_ten_seconds(scheduler: TestScheduler) -> None:
+    commands = scheduler.create_hot_observable(on_next(210, TURN_ON))
+
+    results = scheduler.start(lambda: engine_commands(commands, rx.never(), rx.never()))
+
+    assert results.messages == [on_next(210 + second, TURN_ON) for second in range(10)]
+
+
 def test_opposite_command_of_somebody_else_ends_the_repetition(scheduler: TestScheduler) -> None:
     commands = scheduler.create_hot_observable(on_next(210, TURN_ON), on_next(300, TURN_ON))
     states = scheduler.create_hot_observable(on_next(215, OFF))
@@ -57,6 +74,15 @@ def test_opposite_command_of_somebody_else_ends_the_repetition(scheduler: TestSc
     results = scheduler.start(lambda: engine_commands(commands, states, heard, period=10, times=3))
 
     assert results.messages == [on_next(time, TURN_ON) for time in (210, 220, 300, 310, 320)]
+
+
+def test_new_command_ends_the_repetition_of_the_last_one(scheduler: TestScheduler) -> None:
+    commands = scheduler.create_hot_observable(on_next(210, TURN_ON), on_next(225, TURN_OFF))
+
+    results = scheduler.start(lambda: engine_commands(commands, rx.never(), rx.never(), period=10, times=3))
+
+    times = [(210, TURN_ON), (220, TURN_ON), (225, TURN_OFF), (235, TURN_OFF), (245, TURN_OFF)]
+    assert results.messages == [on_next(time, command) for time, command in times]
 
 
 def test_command_is_repeated_a_limited_number_of_times(scheduler: TestScheduler) -> None:
@@ -72,15 +98,13 @@ Play = Callable[[str], Wired]
 
 
 @pytest.fixture
-def play(make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path) -> Play:
+def play(connect: Connect, spin_until: SpinUntil, tmp_path: Path) -> Play:
     """Begins a scenario with these commands of the virtual operator, the first of them at once."""
 
     def begin(engines: str) -> Wired:
         scenario = tmp_path / "scenario.yaml"
         scenario.write_text(f"engines: {engines}\n")
-        switch = Wired(
-            make_node,
-            spin_until,
+        switch = connect(
             wire,
             inputs=[ENGINES_STATE, ENGINES],
             outputs=[ENGINES, OPERATOR_HEARTBEAT],
@@ -122,15 +146,12 @@ def test_turn_off_by_a_person_ends_the_repetition_of_the_scenario(play: Play, sp
 
 
 def test_restart_without_its_settings_presses_nothing(
-    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+    connect: Connect, spin_for: SpinFor, tmp_path: Path
 ) -> None:
     scenario = tmp_path / "scenario.yaml"
     scenario.write_text("operator: {pressed: [{from: 0.0}], heartbeats: [1.2]}\n")
-    switch = Wired(
-        make_node,
-        spin_until,
+    switch = connect(
         wire,
-        inputs=[],
         outputs=[OPERATOR_HEARTBEAT],
         scenario=str(scenario),
         scenario_epoch=time.monotonic() - 1.0,
@@ -139,4 +160,45 @@ def test_restart_without_its_settings_presses_nothing(
 
     spin_for(0.5)
 
+    assert switch.heard[OPERATOR_HEARTBEAT.name] == []
+
+
+def test_pressed_switch_reports_whose_hand_it_is(connect: Connect, spin_until: SpinUntil) -> None:
+    switch = connect(wire, outputs=[OPERATOR_HAND], pressed=True)
+    spin_until(lambda: switch.heard[OPERATOR_HAND.name])
+
+    assert switch.heard[OPERATOR_HAND.name][0].frame_id == switch.service.get_name()
+
+
+def test_each_report_has_the_rate_of_the_heartbeats(
+    connect: Connect, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    switch = connect(wire, outputs=[OPERATOR_HEARTBEAT], rate=7.0, settings=str(tmp_path / "s"))
+    spin_until(lambda: switch.reports()[-1].get("parameter rate") == "7.0")
+
+    switch.service.set_parameters([Parameter("rate", value=9.0)])
+    spin_until(lambda: switch.reports()[-1].get("parameter rate") == "9.0")
+
+
+def with_one_heartbeat(connect: Connect, tmp_path: Path, at: float) -> Wired:
+    """Return a switch whose scenario sends one heartbeat at a time [s], and has not begun."""
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text(f"operator: {{heartbeats: [{at}]}}\n")
+    return connect(wire, outputs=[OPERATOR_HEARTBEAT], scenario=str(scenario), scenario_epoch=-1.0)
+
+
+def test_scenario_sends_single_heartbeats(connect: Connect, spin_until: SpinUntil, tmp_path: Path) -> None:
+    switch = with_one_heartbeat(connect, tmp_path, 0.3)
+    switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
+    spin_until(lambda: switch.heard[OPERATOR_HEARTBEAT.name])
+    assert [each.data for each in switch.heard[OPERATOR_HEARTBEAT.name]] == [True]
+
+
+def test_scenario_sends_no_single_heartbeat_after_a_person_took_the_switch(
+    connect: Connect, spin_for: SpinFor, tmp_path: Path
+) -> None:
+    switch = with_one_heartbeat(connect, tmp_path, 0.2)
+    switch.service.set_parameters([Parameter("pressed", value=False)])
+    switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
+    spin_for(0.7)
     assert switch.heard[OPERATOR_HEARTBEAT.name] == []

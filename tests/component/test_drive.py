@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import itertools
+import math
+import shutil
+import socket
 import time
 from collections.abc import Callable
 from datetime import timedelta
@@ -11,16 +14,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.parameter import Parameter
+from reactivex import Observable
 from reactivex.testing import ReactiveTest
-from std_msgs.msg import Float64, String
+from std_msgs.msg import String
 
 from interfaces.permission import EngineState
-from interfaces.topics import DRIVEN_TIME, ENGINES_STATE, OFF, ON, THETA1
+from interfaces.service import host
+from interfaces.topics import DRIVEN_TIME, ENGINES_STATE, OFF, ON, THETA1, DrivenTime
 from reactive_node import stamps
-from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
+from reactive_node.testing import SpinUntil, VirtualTime
 from services import config_publisher, drive
 from services.drive import driven_time
-from tests.component.wiring import Wired
+from tests.component.wiring import Connect, Wired
 
 on_next = ReactiveTest.on_next
 
@@ -28,18 +33,27 @@ PERIOD = 0.125  # s; exact in binary
 
 
 def driven(
-    states: list[tuple[float, str, float]], until: float, begin: float = 0.0, pause: float = 0.0
+    states: list[tuple[float, str, float]],
+    until: float,
+    begin: float = 0.0,
+    pause: float = 0.0,
+    full: tuple[float, float] = (0.0, 0.0),
 ) -> list[tuple[float, float]]:
     """:param states: when they arrive, the state, and its age.
     :param pause: which the process makes at 2.1 s.
+    :param full: from when until when the disk is full.
     """
     scheduler = VirtualTime()
     items = [on_next(at, (name, age)) for at, name, age in states]
     heard = scheduler.create_hot_observable(*items).map(lambda it: EngineState(it[0], scheduler.now, it[1]))
     if pause:
         scheduler.schedule_absolute(2.1, lambda *_: scheduler.sleep(pause))
+
+    def keep(_: float) -> bool:
+        return not full[0] <= scheduler.now.timestamp() < full[1]
+
     results = scheduler.start(
-        lambda: driven_time(heard, begin, PERIOD), created=0.001, subscribed=1.0, disposed=until
+        lambda: driven_time(heard, begin, PERIOD, keep), created=0.001, subscribed=1.0, disposed=until
     )
     return [(message.time, message.value.value) for message in results.messages]
 
@@ -87,6 +101,13 @@ def test_restarted_drive_goes_on_where_it_stopped() -> None:
     assert driven([], 1.2, begin=7.5) == [(1.125, 7.5)]
 
 
+def test_time_that_cannot_be_kept_does_not_pass() -> None:
+    times = dict(driven(on(1.01, 6.0), 4.0, full=(2.0, 3.0)))
+
+    assert {times[at] for at in times if 2.0 <= at < 3.0} == {times[1.875]}
+    assert times[3.0] == times[1.875] + PERIOD
+
+
 @pytest.mark.parametrize("pause", [0.29, 4.0])
 def test_pause_moves_the_joints_by_two_periods_at_most(pause: float) -> None:
     times = driven(on(1.01, 9.0), 8.0, pause=pause)
@@ -119,13 +140,13 @@ SCENARIO = "theta1: {center: 0.0, amplitude: 1.0, period: 8.0}\n"
 
 
 @pytest.fixture
-def start(make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path) -> Callable[..., Wired]:
+def start(connect: Connect, tmp_path: Path) -> Callable[..., Wired]:
     file = tmp_path / "scenario.yaml"
     file.write_text(SCENARIO + "drive: {rate: 50.0}\n")
 
     def begin(wire: Any, source: Any, output: Any, **parameters: Any) -> Wired:
         given = {"scenario": str(file), "settings": str(tmp_path), "scenario_epoch": time.monotonic() - 1.0}
-        return Wired(make_node, spin_until, wire, inputs=[source], outputs=[output], **given | parameters)
+        return connect(wire, inputs=[source], outputs=[output], **given | parameters)
 
     return begin
 
@@ -135,7 +156,7 @@ def start_drive(start: Callable[..., Wired]) -> Wired:
 
 
 def times_of(wired: Wired) -> list[float]:
-    return [message.data for message in wired.heard[DRIVEN_TIME.name]]
+    return [DRIVEN_TIME.value(message).seconds for message in wired.heard[DRIVEN_TIME.name]]
 
 
 def test_drive_runs_with_the_engines_and_goes_on_after_a_restart(
@@ -158,6 +179,42 @@ def test_drive_runs_with_the_engines_and_goes_on_after_a_restart(
     assert times_of(second)[0] == last
 
 
+def test_drive_whose_disk_is_full_stands_still_and_moves_no_joint_at_its_restart(
+    start: Callable[..., Wired], spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    (tmp_path / "service.yaml").write_text("time: 3.0\n")
+    (tmp_path / "service.new").mkdir()  # as a full disk, the new file cannot be written
+    first = start_drive(start)
+    first.publish(ENGINES_STATE, String(data=ON))
+    reason = "time: it stands still, because it cannot be kept: "
+    spin_until(lambda: any(reason in it for it in first.remarks()))
+    heard = len(times_of(first))
+    spin_until(lambda: len(times_of(first)) > heard + 1)
+    first.service.destroy_node()
+    first.peer.destroy_node()
+
+    second = start_drive(start)
+    spin_until(lambda: times_of(second))
+
+    assert {*times_of(first), *times_of(second)} == {3.0}
+
+
+def test_drive_keeps_its_time_again_when_a_logout_has_removed_it(
+    start: Callable[..., Wired], spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    (tmp_path / "memory").mkdir()
+    settings = tmp_path / "settings"
+    settings.symlink_to(tmp_path / "memory")
+    (settings / "service.yaml").write_text("time: 3.0\n")
+    drive_ = start(drive.wire, ENGINES_STATE, DRIVEN_TIME, settings=str(settings))
+    spin_until(lambda: times_of(drive_))
+    shutil.rmtree(tmp_path / "memory")
+
+    spin_until(lambda: (settings / "service.yaml").exists())
+    assert (settings / "service.yaml").read_text() == "time: 3.0\n"
+    assert drive_.remarks() == []
+
+
 def test_drive_begins_at_the_beginning(start: Callable[..., Wired], spin_until: SpinUntil) -> None:
     first = start_drive(start)
     spin_until(lambda: times_of(first))
@@ -165,18 +222,45 @@ def test_drive_begins_at_the_beginning(start: Callable[..., Wired], spin_until: 
     assert times_of(first)[0] == 0.0
 
 
-def test_without_a_drive_in_the_scenario_it_says_nothing(
-    make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path
+def test_drive_sends_its_time_at_the_rate_of_the_scenario(
+    start: Callable[..., Wired], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    periods: list[float] = []
+
+    def record(states: Any, begin: float, period: float, keep: Callable[[float], bool]) -> Observable[float]:
+        periods.append(period)
+        return driven_time(states, begin, period, keep)
+
+    monkeypatch.setattr(drive, "driven_time", record)
+    start_drive(start)
+
+    assert periods == [1 / 50.0]
+
+
+def test_drive_names_its_host(start: Callable[..., Wired], spin_until: SpinUntil) -> None:
+    wired = start_drive(start)
+    spin_until(lambda: times_of(wired))
+
+    driven = DRIVEN_TIME.value(wired.heard[DRIVEN_TIME.name][0])
+    assert (driven.source, driven.host) == (host.identity(), socket.gethostname())
+    assert time.time_ns() - driven.stamp < 60e9
+
+
+def test_without_a_drive_in_the_scenario_it_says_nothing(connect: Connect, tmp_path: Path) -> None:
     (tmp_path / "scenario.yaml").write_text(SCENARIO)
     scenario = str(tmp_path / "scenario.yaml")
-    node = Wired(make_node, spin_until, drive.wire, inputs=[], outputs=[], scenario=scenario).service
+    node = connect(drive.wire, scenario=scenario).service
 
     assert DRIVEN_TIME.name not in [each.topic_name.strip("/") for each in node.publishers]
 
 
 def start_joint(start: Callable[..., Wired]) -> Wired:
     return start(lambda node: config_publisher.wire(node, THETA1), DRIVEN_TIME, THETA1)
+
+
+def publish_time(joint: Wired, seconds: float, source: str | None = None) -> None:
+    driven = DrivenTime(time.time_ns(), seconds, host.identity() if source is None else source, "other-host")
+    joint.publish(DRIVEN_TIME, DRIVEN_TIME.message(driven))
 
 
 def angles(wired: Wired) -> list[float]:
@@ -187,9 +271,52 @@ def test_joint_plays_its_track_by_the_driven_time(start: Callable[..., Wired], s
     joint = start_joint(start)
     for time_, expected in ((2.0, 1.0), (2.0, 1.0), (6.0, -1.0)):
         before = len(angles(joint))
-        joint.publish(DRIVEN_TIME, Float64(data=time_))
+        publish_time(joint, time_)
         spin_until(lambda before=before: len(angles(joint)) > before)  # type: ignore[misc]
         assert angles(joint)[-1] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("other", ["", "another host"])
+def test_joint_follows_the_drive_of_its_own_host_only(start: Callable[..., Wired], other: str) -> None:
+    joint = start_joint(start)
+    publish_time(joint, 6.0, other)
+    joint.spin_until(lambda: joint.service.health.dropped)
+    publish_time(joint, 2.0)
+    joint.spin_until(lambda: angles(joint))
+    publish_time(joint, 6.0, other)
+    joint.spin_until(lambda: joint.service.health.dropped == 2)
+
+    assert angles(joint) == [pytest.approx(1.0)]
+    assert any("driven_time: the drive of host other-host publishes it, too" in it for it in joint.remarks())
+
+
+def test_joint_whose_drive_goes_back_stands(start: Callable[..., Wired]) -> None:
+    joint = start_joint(start)
+    publish_time(joint, 2.0)
+    joint.spin_until(lambda: angles(joint))
+    publish_time(joint, 0.0)
+    joint.spin_until(lambda: joint.service.health.dropped)
+
+    assert angles(joint) == [pytest.approx(1.0)]
+    assert any("driven_time: it went back" in it for it in joint.remarks())
+
+
+def test_health_reports_how_fast_a_joint_moves_while_it_follows_its_drive(
+    start: Callable[..., Wired],
+) -> None:
+    joint = start_joint(start)
+    joint.remarks()
+    assert float(joint.reports()[-1]["fastest"]) == pytest.approx(math.pi / 4.0, rel=1e-5)
+
+    joint.service.set_parameters([Parameter("value", value=0.5)])
+    joint.remarks()
+    assert "fastest" not in joint.reports()[-1]
+    assert joint.reports()[-1]["by hand"] == "value"
+
+    joint.service.set_parameters([Parameter("follow_scenario", value=True)])
+    joint.remarks()
+    assert "by hand" not in joint.reports()[-1]
+    assert "fastest" in joint.reports()[-1]
 
 
 def test_joint_plays_no_time_that_waited(
@@ -197,7 +324,7 @@ def test_joint_plays_no_time_that_waited(
 ) -> None:
     joint = start_joint(start)
     monkeypatch.setattr(stamps, "now", lambda shift=timedelta(seconds=0.5), now=stamps.now: now() + shift)
-    joint.publish(DRIVEN_TIME, Float64(data=2.0))
+    publish_time(joint, 2.0)
 
     joint.spin_until(lambda: joint.service.health.dropped)
     assert angles(joint) == []
@@ -210,6 +337,6 @@ def test_joint_that_is_set_by_hand_is_given_back_to_the_drive(
     joint.service.set_parameters([Parameter("value", value=0.5)])
     spin_until(lambda: angles(joint) == [0.5])
     joint.service.set_parameters([Parameter("follow_scenario", value=True)])
-    joint.publish(DRIVEN_TIME, Float64(data=2.0))
+    publish_time(joint, 2.0)
 
     spin_until(lambda: angles(joint)[-1] == pytest.approx(1.0))

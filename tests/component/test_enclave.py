@@ -1,4 +1,4 @@
-"""The keys with which a process joins: how long they are valid, and what their process tells of that."""
+"""The keys with which a process joins: how long they are valid, and what their process reports of that."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_nobody_joins_before_or_after_the_validity() -> None:
         (timedelta(minutes=5), "0 hours"),
     ],
 )
-def test_end_of_the_keys_is_told_two_weeks_before(left: timedelta, amount: str) -> None:
+def test_end_of_the_keys_is_reported_two_weeks_before(left: timedelta, amount: str) -> None:
     assert KEYS.warning(END - left) == f"they end in {amount}, and the arm with them: {RENEW}"
     assert KEYS.warning(END - timedelta(days=14)) == ""
 

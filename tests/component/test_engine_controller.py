@@ -4,24 +4,19 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+import reactivex as rx
 from hypothesis import given
 from hypothesis import strategies as st
+from reactivex.scheduler import ImmediateScheduler
+from reactivex.subject import Subject
 from reactivex.testing import ReactiveTest, TestScheduler
 
+from interfaces.latch import Command, Comparison, Event, Latch, Presence, Tick
+from interfaces.permission import NEVER
 from interfaces.service import Rejected
 from interfaces.topics import CLOCK_TOLERANCE, DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
 from reactive_node.stamps import Timestamp
-from services.engine_controller import (
-    NEVER,
-    Command,
-    Event,
-    Latch,
-    Parameters,
-    Presence,
-    Tick,
-    engine_state,
-    step,
-)
+from services.engine_controller import Parameters, engine_state, step, turns
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe
 
@@ -30,16 +25,20 @@ def at_time(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
 
 
-def latch(engines: str, seen: float | None, repeated: float, *says: str) -> Latch:
-    return Latch(engines, NEVER if seen is None else at_time(seen), at_time(repeated), says)
+def latch(engines: str, seen: float | None, repeated: float, *outputs: str) -> Latch:
+    return Latch(engines, NEVER if seen is None else at_time(seen), at_time(repeated), outputs)
 
 
 def presence(age: float) -> Presence:
     return Presence(at_time(NOW), age)
 
 
-def command(name: str, age: float = 0.0, clocks: str = "") -> Command:
-    return Command(at_time(NOW), age, name, clocks)
+def command(name: str, age: float = 0.0) -> Command:
+    return Command(at_time(NOW), age, name)
+
+
+def refusing(latch: Latch, refusal: str = "one is wrong") -> Latch:
+    return latch._replace(refusal=refusal)
 
 
 NOW = 100.0
@@ -54,7 +53,11 @@ TICK = Tick(at_time(NOW))
         (OFF_AND_SEEN, TICK, latch(OFF, 99.5, NOW, OFF)),
         (ON_AND_SEEN, TICK, latch(ON, 99.5, NOW, ON)),
         (ON_AND_SEEN, command(TURN_OFF), latch(OFF, 99.5, NOW, OFF)),
-        (ON_AND_SEEN, command(TURN_OFF, clocks="one is wrong"), latch(OFF, 99.5, NOW, OFF)),
+        (refusing(ON_AND_SEEN), command(TURN_OFF), refusing(latch(OFF, 99.5, NOW, OFF))),
+        (OFF_AND_SEEN, Comparison(at_time(NOW), "one is wrong"), refusing(OFF_AND_SEEN)),
+        (ON_AND_SEEN, Comparison(at_time(NOW), "one is wrong"), refusing(ON_AND_SEEN)),
+        (refusing(OFF_AND_SEEN), Comparison(at_time(NOW), ""), OFF_AND_SEEN),
+        (latch(ON, 90.0, 99.9), Comparison(at_time(NOW), ""), latch(OFF, 90.0, NOW, OFF)),
         (ON_AND_SEEN, command(TURN_OFF, 99.0), latch(OFF, 99.5, NOW, OFF)),
         (OFF_AND_SEEN, command(TURN_ON), latch(ON, 99.5, NOW, ON)),
         (OFF_AND_SEEN, command(TURN_OFF), OFF_AND_SEEN),
@@ -82,7 +85,7 @@ def test_step(before: Latch, event: Event, after: Latch) -> None:
     [
         (OFF_AND_SEEN, command(TURN_ON, 1.0), "engines", "turn_on refused: 1.000 s old"),
         (OFF_AND_SEEN, command(TURN_ON, -1.0), "engines", "turn_on refused: -1.000 s old"),
-        (OFF_AND_SEEN, command(TURN_ON, -1.0, "one is wrong"), "engines", "turn_on refused: one is wrong"),
+        (refusing(OFF_AND_SEEN), command(TURN_ON, -1.0), "engines", "turn_on refused: one is wrong"),
         (latch(OFF, None, 99.9), command(TURN_ON), "engines", "turn_on refused: no operator seen yet"),
         (
             latch(OFF, 99.0, 99.9),
@@ -101,15 +104,15 @@ def test_step(before: Latch, event: Event, after: Latch) -> None:
 def test_step_rejects(before: Latch, event: Event, topic: str, reason: str) -> None:
     after = step(before, event)
 
-    (rejected,) = after.says
+    (rejected,) = after.outputs
     assert isinstance(rejected, Rejected)
     assert (rejected.topic.name, rejected.reason) == (topic, reason)
-    assert after._replace(says=()) == before
-    assert step(after, TICK).says == (before.engines,)
+    assert after._replace(outputs=()) == before
+    assert step(after, TICK).outputs == (before.engines,)
 
 
 def test_event_that_comes_too_late_is_rejected_and_turns_off() -> None:
-    rejected, engines = step(latch(ON, 90.0, 99.9), command(TURN_ON, 2.0)).says
+    rejected, engines = step(latch(ON, 90.0, 99.9), command(TURN_ON, 2.0)).outputs
 
     assert isinstance(rejected, Rejected)
     assert engines == OFF
@@ -144,8 +147,7 @@ class Engines:
         presences: list[tuple[float, float]],
         until: float,
         *,
-        repeat: float = 1.0,
-        drive_timeout: float = 4.0,
+        repeat: float = 0.1,
     ) -> list[tuple[float, str]]:
         self.commands = self.scheduler.create_hot_observable(
             *(on_next(at, Timestamp(command, at_time(source))) for at, command, source in commands)
@@ -155,10 +157,11 @@ class Engines:
         )
         results = self.scheduler.start(
             lambda: engine_state(
-                self.commands.map(lambda it: Command(self.scheduler.now, self._age(it), it.value, "")),
-                self.presences.map(lambda it: Presence(self.scheduler.now, self._age(it))),
-                Parameters(repeat=repeat),
-                drive_timeout,
+                turns(
+                    self.commands.map(lambda it: Command(self.scheduler.now, self._age(it), it.value)),
+                    self.presences.map(lambda it: Presence(self.scheduler.now, self._age(it))),
+                    Parameters(repeat=repeat),
+                )
             ),
             created=0.001,
             subscribed=0.002,
@@ -189,9 +192,9 @@ def engines() -> Engines:
 
 
 def test_engines_start_off_and_the_state_is_repeated(engines: Engines) -> None:
-    assert engines.states([], [], 3.5) == [(0.002, OFF), (1.002, OFF), (2.002, OFF), (3.002, OFF)]
-    assert engines.commands.subscriptions == [subscribe(0.002, 3.5)]
-    assert engines.presences.subscriptions == [subscribe(0.002, 3.5)]
+    assert engines.states([], [], 0.35) == [(0.002, OFF), (0.102, OFF), (0.202, OFF), (0.302, OFF)]
+    assert engines.commands.subscriptions == [subscribe(0.002, 0.35)]
+    assert engines.presences.subscriptions == [subscribe(0.002, 0.35)]
 
 
 def test_commands_are_obeyed_at_once_with_the_operator_present(engines: Engines) -> None:
@@ -202,9 +205,9 @@ def test_commands_are_obeyed_at_once_with_the_operator_present(engines: Engines)
 
 
 def test_command_without_effect_emits_nothing(engines: Engines) -> None:
-    commands = [(at, TURN_OFF, at) for at in (0.1, 0.2, 0.3)]
+    commands = [(at, TURN_OFF, at) for at in (0.01, 0.02, 0.03)]
 
-    assert engines.states(commands, seen_until(2), 1.5) == [(0.002, OFF), (1.002, OFF)]
+    assert engines.states(commands, seen_until(2), 0.15) == [(0.002, OFF), (0.102, OFF)]
 
 
 def test_turn_on_is_refused_before_the_operator_was_seen(engines: Engines) -> None:
@@ -229,19 +232,19 @@ def test_turn_off_is_obeyed_at_any_age(engines: Engines) -> None:
 def test_engines_turn_off_for_good_10_s_after_the_last_presence(engines: Engines) -> None:
     states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(5), *seen_until(30, begin=16)])
 
-    assert states == [(0.002, OFF), (2.2, ON), (15.002, OFF)]
+    assert states == [(0.002, OFF), (2.2, ON), (14.902, OFF)]
 
 
 def test_late_presence_is_as_old_as_its_stamp(engines: Engines) -> None:
     states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(3), (11.0, 3.4)])
 
-    assert states == [(0.002, OFF), (2.2, ON), (14.002, OFF)]
+    assert states == [(0.002, OFF), (2.2, ON), (13.402, OFF)]
 
 
 def test_presence_from_the_future_or_the_past_counts_for_nothing(engines: Engines) -> None:
-    states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(3), (4.0, 5.0), (5.0, 2.9), (6.0, 2.5)])
+    states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(3), (4.0, 5.0), (5.0, 2.9), (6.0, 1.5)])
 
-    assert states == [(0.002, OFF), (2.2, ON), (13.002, OFF)]
+    assert states == [(0.002, OFF), (2.2, ON), (12.902, OFF)]
     assert engines.rejections == ["it is stamped by a clock that is 1.000 s ahead of ours"]
 
 
@@ -262,7 +265,7 @@ def test_setting_the_clock_changes_nothing(engines: Engines, hours: float) -> No
 
     states = engines.run([(2.2, TURN_ON, 2.2)], presences, until=45.0)
 
-    assert states == [(0.002, OFF), (2.2, ON), (30.002, OFF)]
+    assert states == [(0.002, OFF), (2.2, ON), (29.902, OFF)]
 
 
 def test_pause_across_timeout_turns_off(engines: Engines) -> None:
@@ -273,7 +276,7 @@ def test_pause_across_timeout_turns_off(engines: Engines) -> None:
 
 
 def test_pause_longer_than_the_drive_timeout_turns_off(engines: Engines) -> None:
-    engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(4.0))
+    engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(0.31))
     states = engines.states([(1.2, TURN_ON, 1.2)], seen_until(20), 20.0)
     assert {state for time, state in states if 1.3 < time < 5.15} == {ON}
     assert {state for time, state in states if time > 5.15} == {OFF}
@@ -286,14 +289,14 @@ def test_turn_on_that_waited_during_a_pause_is_not_undone() -> None:
 
 
 def test_short_pause_across_timeout_turns_off(engines: Engines) -> None:
-    engines.scheduler.schedule_absolute(9.9, lambda *_: engines.scheduler.sleep(2.0))
+    engines.scheduler.schedule_absolute(10.9, lambda *_: engines.scheduler.sleep(0.29))
     states = engines.states([(1.2, TURN_ON, 1.2)], [(1.0, 1.0)], 20.0)
-    assert ON in {state for time, state in states if time < 9.95}
-    assert {state for time, state in states if time > 9.95} == {OFF}
+    assert ON in {state for time, state in states if time < 10.95}
+    assert {state for time, state in states if time > 10.95} == {OFF}
 
 
 def test_pause_shorter_than_the_drive_timeout_changes_nothing(engines: Engines) -> None:
-    engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(2.0))
+    engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(0.29))
     assert engines.run([(1.2, TURN_ON, 1.2)], seen_until(12), 12.0) == [(0.002, OFF), (1.2, ON)]
 
 
@@ -301,10 +304,34 @@ def test_engines_are_off_after_a_restart(engines: Engines) -> None:
     assert engines.run([], seen_until(30)) == [(0.002, OFF)]
 
 
-def test_presence_after_the_timeout_is_too_late(engines: Engines) -> None:
-    states = engines.run([(1.6, TURN_ON, 1.6)], [(1.5, 1.5), (11.7, 11.7)], 20.0)
+def test_state_waits_for_nothing_that_is_scheduled() -> None:
+    commands, presences = Subject[Command](), Subject[Presence]()
+    found: list[Any] = []
+    scheduler = TestScheduler()
+    engine_state(turns(commands, presences)).subscribe(found.append, scheduler=scheduler)
+    scheduler.advance_to(0.05)
+    found.clear()
+    presences.on_next(presence(0.0))
+    commands.on_next(command(TURN_ON))
+    commands.on_next(command(TURN_OFF))
+    assert found == [ON, OFF]
 
-    assert states == [(0.002, OFF), (1.6, ON), (11.7, OFF)]
+
+def test_clocks_are_compared_before_the_first_command() -> None:
+    at_once = ImmediateScheduler.singleton()
+    found: list[Event] = []
+    first, then = Comparison(at_time(NOW), "one is wrong"), command(TURN_ON)
+    latched = turns(rx.just(then, at_once), rx.never(), comparisons=rx.just(first, at_once))
+    scheduler = TestScheduler()
+    latched.map(lambda turn: turn.event).subscribe(found.append, scheduler=scheduler)
+    scheduler.advance_to(0.05)
+    assert found[:2] == [first, then]
+
+
+def test_presence_after_the_timeout_is_too_late(engines: Engines) -> None:
+    states = engines.run([(1.6, TURN_ON, 1.6)], [(1.45, 1.45), (11.48, 11.48)], 20.0)
+
+    assert states == [(0.002, OFF), (1.6, ON), (11.48, OFF)]
 
 
 @pytest.mark.parametrize("repeat", [0.02, 0.1, 0.2])
@@ -314,9 +341,7 @@ def test_drive_stops_within_10_45_s_whenever_the_controller_dies(repeat: float, 
     arrival = sign_of_life + lag  # a presence that seems new, as the operator's clock is ahead by as much
     stops = []
     for death in (10.9 + n / 100 for n in range(40)):
-        states = Engines().states(
-            [(1.1, TURN_ON, 1.1)], [(arrival, arrival)], death, repeat=repeat, drive_timeout=DRIVE_TIMEOUT
-        )
+        states = Engines().states([(1.1, TURN_ON, 1.1)], [(arrival, arrival)], death, repeat=repeat)
         (*_, (last_on, _)) = [state for state in states if state[1] == ON]
         (*_, (last_time, last)) = states
         stops.append(last_time if last == OFF else last_on + DRIVE_TIMEOUT)
@@ -325,7 +350,7 @@ def test_drive_stops_within_10_45_s_whenever_the_controller_dies(repeat: float, 
     assert max(stops) > sign_of_life + 10.0
 
 
-times = st.floats(0.01, 50.0)
+times = st.floats(0.01, 25.0)
 
 
 @given(
@@ -339,18 +364,18 @@ def test_engines_are_never_on_without_presence_or_against_a_command(
     ordered = [(at, command, at + lag) for at, command, lag in sorted(commands)]
     seen = [(at, min(at, stamp)) for at, stamp in arrived if stamp <= at + CLOCK_TOLERANCE + 1e-5]
 
-    emitted = Engines().states(ordered, arrived, until=70.0)
+    emitted = Engines().states(ordered, arrived, 40.0, repeat=0.2)
 
     for time, state in emitted:
         if state == ON:
             assert time - max(stamp for at, stamp in seen if at <= time) < 10.0 + 1e-5
     states = changes(emitted)
-    for (begin, state), (end, _) in zip(states, [*states[1:], (70.0, OFF)], strict=True):
+    for (begin, state), (end, _) in zip(states, [*states[1:], (40.0, OFF)], strict=True):
         if state == ON:
             assert any(abs(begin - at) < 1e-6 and command == TURN_ON for at, command, _ in ordered)
             assert any(at <= begin and begin - 1.0 - 1e-5 <= stamp for at, stamp in seen)
             within = [command for at, command, _ in ordered if begin + 1e-6 < at < end - 1e-6]
             assert TURN_OFF not in within
             lasting = [stamp for at, stamp in seen if at < end]
-            assert end - max(lasting) <= 10.0 + 1.0 + 1e-5  # at the next tick
+            assert end - max(lasting) <= 10.0 + 0.2 + 1e-5  # at the next tick
     assert states[0][1] == OFF

@@ -5,8 +5,11 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
+from rclpy.exceptions import ParameterException
+from rclpy.parameter import Parameter
 from std_msgs.msg import Header, String
 
+from interfaces.service import ServiceNode
 from interfaces.service.clocks import HOST, Clocks
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
 from reactive_node import stamps
@@ -106,15 +109,65 @@ def test_engines_turn_off_after_the_timeout_of_the_parameter(wired: Any) -> None
     assert controller.remarks() == []
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("presence_timeout", 10.1), ("max_presence_age", 1.1), ("repeat", 0.21)]
+)
+def test_parameter_that_delays_the_stop_is_refused(make_node: MakeNode, name: str, value: float) -> None:
+    given = [Parameter(name, value=value)]
+    with pytest.raises(ParameterException):
+        wire(make_node(kind=ServiceNode, parameter_overrides=given))
+
+
 def test_turn_on_is_refused_while_the_clock_of_another_host_is_wrong(
     wired: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv(HOST, "robot")
+    monkeypatch.setattr(Clocks, "refusal", lambda _: "the clock of host desk is wrong")
     controller = wired()
     controller.see()
-    monkeypatch.setattr(Clocks, "objection", lambda _: "the clock of host desk is wrong")
     controller.command(TURN_ON)
 
     assert controller.await_rejection() == "engines: turn_on refused: the clock of host desk is wrong"
+
+
+def test_turn_on_is_accepted_when_the_clock_of_another_host_is_right_again(
+    wired: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refusals = ["the clock of host desk is wrong"]
+    monkeypatch.setenv(HOST, "robot")
+    monkeypatch.setattr(Clocks, "refusal", lambda _: refusals[-1])
+    controller = wired()
+    controller.see()
+    controller.command(TURN_ON)
+    controller.await_rejection()
+    refusals.append("")
+
+    def is_on() -> bool:
+        controller.see()
+        controller.command(TURN_ON)
+        return controller.states[-1] == ON
+
+    controller.spin_until(is_on)
+
+
+def test_clocks_are_looked_at_again_although_nobody_reports(
+    wired: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refusals, reports = [""], list[Any]()
+    monkeypatch.setenv(HOST, "robot")
+    monkeypatch.setattr(Clocks, "refusal", lambda _: refusals[-1])
+    monkeypatch.setattr(Clocks, "hear", lambda _, report: reports.append(report))
+    controller = wired()
+    controller.spin_until(lambda: reports)  # its own first one: it makes no other
+    controller.see()
+    refusals.append("the clock of host desk is wrong")
+
+    def is_refused() -> bool:
+        controller.see()
+        controller.command(TURN_ON)
+        return bool(controller.service.health.dropped)
+
+    controller.spin_until(is_refused)
 
 
 def test_turn_on_is_refused_until_the_clocks_of_the_hosts_are_compared(

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import os
 import socket
 import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,11 +11,15 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import ClockType
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from rclpy.time import Time
 
+from interfaces.arm_variables import SYSTEM
+from interfaces.limits import LARGEST_MESSAGE, bad_report
 from interfaces.service import ServiceNode
-from interfaces.service.health import healths, heard_healths, reported_parameters
-from interfaces.topics import DIAGNOSTICS
+from interfaces.service.beats import Beats
+from interfaces.service.health import cause, healths, heard_healths, reported_parameters
+from interfaces.topics import DIAGNOSTICS, ROWS
 from reactive_node.testing import MakeNode, SpinUntil
 from services import dead_mans_switch, operator_watchdog
 
@@ -44,7 +50,7 @@ def test_report_of_a_service_in_the_namespace_is_read() -> None:
         ("/arm1/battery", GOOD | {"seconds_since_output": "nan"}),
         ("/arm1/battery", GOOD | {"seconds_since_output": "inf"}),
         ("/arm1/battery", GOOD | {"seconds_since_output": "1e300"}),
-        ("/arm1/battery", GOOD | {"seconds_since_turn_off": "-1"}),
+        ("/arm1/battery", GOOD | {"seconds_since_output": "-1"}),
         ("", {}),
     ],
 )
@@ -52,7 +58,7 @@ def test_other_statuses_are_ignored(name: str, values: dict[str, Any]) -> None:
     assert healths(message(name, values), "/arm1") == {}
 
 
-def test_report_tells_whether_the_service_is_ok_and_when_it_was_heard() -> None:
+def test_report_says_whether_the_service_is_ok_and_when_it_was_heard() -> None:
     report = message("/velocity", GOOD)
     report.status[0].level = DiagnosticStatus.WARN
     before = time.monotonic()
@@ -77,8 +83,8 @@ def test_latest_report_of_each_service_of_each_host_is_kept(
     publisher = make_node("peer").create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
     with heard_healths(make_node("listener", namespace=namespace)) as latest:
         spin_until(publisher.get_subscription_count)
-        told = [("a", "velocity", 7), ("a", "kinematics", 8), ("b", "velocity", 7), ("a", "velocity", 9)]
-        for host, name, pid in told:
+        senders = [("a", "velocity", 7), ("a", "kinematics", 8), ("b", "velocity", 7), ("a", "velocity", 9)]
+        for host, name, pid in senders:
             publisher.publish(message(f"{namespace}/{name}", GOOD | {"pid": str(pid)}, host))
         spin_until(lambda: ("a", "velocity") in latest and latest["a", "velocity"].pid == 9)
 
@@ -103,6 +109,22 @@ def test_health_is_due_every_second_on_the_steady_clock(service: ServiceNode) ->
     assert timer.clock.clock_type == ClockType.STEADY_TIME
 
 
+def test_each_second_shows_a_sign_of_life(
+    service: ServiceNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(SYSTEM, str(tmp_path))
+    reader = Beats(tmp_path)
+    spin_until(lambda: os.getpid() in reader.take())
+
+
+def test_report_carries_the_time_of_day_in_simulated_time(make_node: MakeNode, spin_until: SpinUntil) -> None:
+    heard: list[DiagnosticArray] = []
+    make_node("peer").create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, heard.append, DIAGNOSTICS.qos)
+    make_node("simulated", kind=ServiceNode, parameter_overrides=[Parameter("use_sim_time", value=True)])
+    spin_until(lambda: heard)
+    assert abs(time.time_ns() - Time.from_msg(heard[-1].header.stamp).nanoseconds) < 10e9
+
+
 def test_warning_is_logged_when_it_is_new(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
     logged: list[str] = []
     logger = service.get_logger()
@@ -116,9 +138,91 @@ def test_warning_is_logged_when_it_is_new(service: ServiceNode, monkeypatch: pyt
     assert logged == ["l1: early; l1: late", "l1: late; l1: lost", "l1: late"]
 
 
+def test_cause_with_other_numbers_is_no_new_cause(
+    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logged: list[str] = []
+    sent: list[Any] = []
+    logger = service.get_logger()
+    monkeypatch.setattr(logger, "warning", logged.append)
+    monkeypatch.setattr(service, "get_logger", lambda: logger)
+    monkeypatch.setattr(service.health, "publisher", SimpleNamespace(publish=sent.append))
+    for second in range(3):
+        for age in range(10):
+            service.health.drop("theta1", f"it is {second}.{age}00 s old")
+        service.health.drop("theta1", f"-{second}e-05 is not finite")
+        service.health.standing = {"disk": f"{second} MB are left"}
+        service.health.report()
+    service.health.drop("theta1", "nan is not finite")
+    service.health.report()
+
+    assert logged == ["disk: 0 MB are left; theta1: -0e-05 is not finite; theta1: it is 0.000 s old"]
+    assert [each.status[0].message for each in sent[1:3]] == [
+        f"theta1: it is {second}.000 s old (10 times); theta1: -{second}e-05 is not finite; "
+        f"disk: {second} MB are left"
+        for second in (1, 2)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("l1 publishes it", "l2 publishes it"),
+        ("/ur/2 publishes it", "/ur/3 publishes it"),
+        ("the clock of host arm-2 is late", "the clock of host arm-3 is late"),
+        ("cannot deserialize 8 bytes as a/msg/Float32", "cannot deserialize 8 bytes as a/msg/Float64"),
+    ],
+)
+def test_number_in_a_name_distinguishes_causes(one: str, other: str) -> None:
+    assert cause(one) != cause(other)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("[nan, 0.0, 1e-05] is not finite", "[-1.5, inf, 2] is not finite"),
+        ("(1.0, -nan)", "(1e300, 7)"),
+        ("8 octets", "12 octets"),
+        ("the motor has 81.5C", "the motor has 9C"),
+        ("it is 0.301 s old", "it is 12.000 s old"),
+        ("status 0x7f3a", "status 0xC0"),
+        ("NaN of 1E-05", "-Inf of 2.5E+10"),
+    ],
+)
+def test_number_that_is_measured_is_no_part_of_a_cause(one: str, other: str) -> None:
+    assert cause(one) == cause(other)
+
+
+def test_long_cause_with_other_numbers_is_no_new_cause(
+    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logged: list[str] = []
+    logger = service.get_logger()
+    monkeypatch.setattr(logger, "warning", logged.append)
+    monkeypatch.setattr(service, "get_logger", lambda: logger)
+    for number in (7, 1234.5):
+        service.remark("drive", f"its motors have {[number] * 20} C, " + 30 * "and so on ")
+        service.health.report()
+
+    assert len(logged) == 1
+
+
+def test_report_is_never_too_large_to_be_read(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[Any] = []
+    monkeypatch.setattr(service.health, "publisher", SimpleNamespace(publish=sent.append))
+    for number in range(1000):
+        for subject in ("l1", "l2", "theta1", "theta2"):
+            service.health.refuse(subject, f"{number}\ufffd" * 10_000, -(2**63) + number, -(2**63))
+        for topic in ROWS:
+            service.health.drop(topic.name, f"{number}\ufffd" * 10_000)
+    service.health.report()
+    assert len(serialize_message(sent[0])) <= LARGEST_MESSAGE
+    assert bad_report(sent[0]) == ""
+
+
 def test_standing_warning_is_in_each_report(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
     published: list[Any] = []
-    monkeypatch.setattr(service.health._publisher, "publish", published.append)
+    monkeypatch.setattr(service.health.publisher, "publish", published.append)
     service.health.standing = {"disk": "it is nearly full"}
     service.remark("l1", "late")
     for _ in range(2):
@@ -137,7 +241,7 @@ def test_report_has_host_uptime_and_age_of_the_last_output(
     service: ServiceNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     published: list[Any] = []
-    monkeypatch.setattr(service.health._publisher, "publish", published.append)
+    monkeypatch.setattr(service.health.publisher, "publish", published.append)
     monkeypatch.setattr(service.health, "_started", 100.0)
     monkeypatch.setattr("interfaces.service.health.time.monotonic", lambda: 107.0)
     service.health.count_output()
@@ -153,7 +257,7 @@ def test_report_has_host_uptime_and_age_of_the_last_output(
     assert before <= Time.from_msg(array.header.stamp) <= service.get_clock().now()
 
 
-def test_report_tells_the_parameters_that_are_not_the_default(
+def test_report_has_the_parameters_that_are_not_the_default(
     make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = [Parameter("silence", value=1.5), Parameter("strikes", value=3), Parameter("rate", value=50.0)]
@@ -161,7 +265,7 @@ def test_report_tells_the_parameters_that_are_not_the_default(
     service.declare(operator_watchdog.Parameters)
     service.declare(dead_mans_switch.Parameters)
     published: list[Any] = []
-    monkeypatch.setattr(service.health._publisher, "publish", published.append)
+    monkeypatch.setattr(service.health.publisher, "publish", published.append)
     service.health.report()
 
     (status,) = published[0].status
@@ -174,11 +278,29 @@ def test_report_is_sent_when_a_subscriber_comes_not_when_one_goes(
     reports: list[int] = []
     for change in (1, 0, -1, 2):
         monkeypatch.setattr(service.health, "report", lambda change=change: reports.append(change))
-        service.health._on_matched(SimpleNamespace(current_count_change=change))
+        service.health.on_matched(SimpleNamespace(current_count_change=change))
 
     assert reports == [1, 2]
 
 
+def test_new_subscriber_hears_what_the_last_look_found(
+    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = make_node("service", kind=ServiceNode)
+    found = iter([["a loop"], []])
+    health = service.health
+    monkeypatch.setattr(service.peers, "problems", lambda: (("cmd_vel_in", reason) for reason in next(found)))
+    published: list[Any] = []
+    monkeypatch.setattr(health.publisher, "publish", published.append)
+    health.on_period()
+    health.on_matched(SimpleNamespace(current_count_change=1))
+    health.on_matched(SimpleNamespace(current_count_change=1))
+    health.on_period()
+    health.on_matched(SimpleNamespace(current_count_change=1))
+    messages = [array.status[0].message for array in published]
+    assert messages == [*3 * ["cmd_vel_in: a loop"], "running", "running"]
+
+
 def test_subscriber_that_comes_as_the_node_ends_is_no_error(service: ServiceNode) -> None:
     service.destroy_node()
-    service.health._on_matched(SimpleNamespace(current_count_change=1))
+    service.health.on_matched(SimpleNamespace(current_count_change=1))

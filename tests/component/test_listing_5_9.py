@@ -13,13 +13,14 @@ from reactivex.scheduler import VirtualTimeScheduler
 from reactivex.subject import Subject
 from reactivex.testing import TestScheduler
 
-from deploy.operator.engines import Graph
 from deploy.operator.lines import Line, line_batches
-from interfaces import topics
+from interfaces import cause, topics
+from interfaces.explanation import engine_causes
+from interfaces.latch import Command, Presence
 from interfaces.sources import playback, scenario_file
 from interfaces.topics import Position
 from reactive_node import stamps
-from services.engine_controller import Command, Presence, engine_state
+from services.engine_controller import engine_state, turns
 from services.kinematics import effector_position
 from services.operator_watchdog import engine_commands, operator_activity
 from services.velocity import effector_speed
@@ -79,7 +80,7 @@ class Arm:
         self.topics: dict[str, Subject[Any]] = {topic.name: Subject() for topic in topics.CONTRACT}
         self.lines: list[str] = []
         played = scenario_file.load(path)
-        batches = line_batches(self.seen, rx.never(), rx.interval(0.1), Graph(frozenset, set))
+        batches = line_batches(self.seen, rx.interval(0.1))
         batches.subscribe(self.print, scheduler=self.scheduler)
         self.scheduler.advance_to(START)
         self.wire()
@@ -111,11 +112,13 @@ class Arm:
         self.publish("operator_activity", activity.map(lambda it: it.conclusion))
         self.publish("engines", engine_commands(activity))
 
-        commands = self.topics["engines"].map(lambda it: Command(self.scheduler.now, 0.0, it, ""))
+        commands = self.topics["engines"].map(lambda it: Command(self.scheduler.now, 0.0, it))
         presences = self.topics["operator_presence"].map(
             lambda it: Presence(self.scheduler.now, self.age(it))
         )
-        self.publish("engines/state", engine_state(commands, presences))
+        latched = turns(commands, presences).share()
+        self.publish("engines/state", engine_state(latched))
+        self.publish("engines/cause", engine_causes(latched, rx.never()).map(cause.message))
 
     def age(self, stamp: datetime) -> float:
         return (self.scheduler.now - stamp).total_seconds()
@@ -139,5 +142,5 @@ def test_engines_never_ran() -> None:
     arm.scheduler.advance_to(20.0)
 
     assert [re.sub(r"\[.*\] ", "", line) for line in arm.lines if "Engines are" in line] == [
-        "Engines are off"
+        "Engines are off, not turned on since engine_controller started"
     ]

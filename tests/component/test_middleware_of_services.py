@@ -67,6 +67,26 @@ def test_only_our_settings_for_this_machine_change(
     assert os.environ == before
 
 
+@pytest.mark.parametrize(
+    ("rmw", "changes", "why"),
+    [
+        ("rmw_fastrtps_cpp", {}, ""),
+        ("rmw_fastrtps_cpp", {middleware.RANGE: "SUBNET", middleware.PROFILES: "/mine.xml"}, ""),
+        ("rmw_fastrtps_cpp", {middleware.PROFILES: "/mine.xml"}, "there is no /mine.localhost.xml"),
+        ("rmw_fastrtps_cpp", {middleware.PEERS: "192.0.2.1"}, "ROS_STATIC_PEERS is set"),
+        ("rmw_cyclonedds_cpp", {middleware.PEERS: "192.0.2.1"}, ""),
+    ],
+)
+def test_what_brings_shared_memory_back_is_known(
+    monkeypatch: pytest.MonkeyPatch, rmw: str, changes: dict[str, str], why: str
+) -> None:
+    settings = {middleware.RANGE: "LOCALHOST", middleware.PROFILES: str(FASTDDS), middleware.PEERS: ""}
+    for name, value in (settings | changes).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(middleware, "get_rmw_implementation_identifier", lambda: rmw)
+    assert middleware.shared_memory() == why
+
+
 def test_other_middleware_keeps_the_range(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(middleware.RANGE, "LOCALHOST")
     monkeypatch.setenv(middleware.PROFILES, str(FASTDDS))
@@ -93,7 +113,7 @@ def test_no_node_joins_without_the_loopback_interface(
 def test_process_that_stands_still_loses_no_packet(make_node: Callable[..., Node]) -> None:
     publisher = make_node().create_publisher(Float64, "burst", 10)
     with subprocess.Popen([sys.executable, "-c", READER], stdout=subprocess.PIPE, text=True) as reader:
-        last_resort = threading.Timer(20.0, reader.kill)
+        last_resort = threading.Timer(150.0, reader.kill)
         last_resort.start()
         assert reader.stdout is not None
         while not select.select([reader.stdout], [], [], 0.05)[0]:

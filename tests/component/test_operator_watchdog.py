@@ -10,9 +10,10 @@ from reactivex import Observable
 from reactivex.subject import Subject
 from reactivex.testing import ReactiveTest, TestScheduler
 
+from interfaces.activity import Activity
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node.stamps import Timestamp
-from services.operator_watchdog import Activity, Parameters, engine_commands, operator_activity
+from services.operator_watchdog import Parameters, engine_commands, operator_activity
 
 on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe
 
@@ -197,7 +198,7 @@ def test_watchdog_that_resumes_reports_the_first_heartbeat_at_once(scheduler: Te
 def test_successor_waits_for_its_first_heartbeat_before_a_strike(scheduler: TestScheduler) -> None:
     quick = Parameters(sampling=0.05, silence=0.25, strikes=1)
 
-    watched = watch(scheduler, hot(scheduler, 0.9), 2.0, given=quick, resumes=True)
+    watched = watch(scheduler, hot(scheduler, 0.9), 2.0, parameters=quick, resumes=True)
 
     assert watched.alive == [0.9]
     assert [round(time, 3) for time in watched.missed] == [1.15]
@@ -230,7 +231,7 @@ def test_a_lost_heartbeat_is_no_strike_if_silence_is_sampling_and_two_periods(
     times = [(begin + 50 * beat) / 1000 for beat in range(40) if beat % 4]  # each fourth one is lost
     scheduler = TestScheduler()
 
-    watched = watch(scheduler, hot(scheduler, *times), times[-1], given=shortest, resumes=True)
+    watched = watch(scheduler, hot(scheduler, *times), times[-1], parameters=shortest, resumes=True)
 
     assert watched[1:] == ([], [], [])
 

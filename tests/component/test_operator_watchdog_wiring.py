@@ -22,20 +22,20 @@ from interfaces.topics import (
     TURN_OFF,
 )
 from reactive_node import stamps
-from reactive_node.testing import MakeNode, SpinFor, SpinUntil
+from reactive_node.testing import SpinFor, SpinUntil
 from services import operator_watchdog
 from services.operator_watchdog import wire
-from tests.component.wiring import Wired
+from tests.component.wiring import Connect, Wired
 
 OUTPUTS = [OPERATOR_PRESENCE, OPERATOR_ACTIVITY, ENGINES]
 
 
 @pytest.fixture
-def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch) -> Any:
+def wired(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
 
     def make(**parameters: Any) -> Wired:
-        return Wired(make_node, spin_until, wire, inputs=[OPERATOR_HEARTBEAT], outputs=OUTPUTS, **parameters)
+        return connect(wire, inputs=[OPERATOR_HEARTBEAT], outputs=OUTPUTS, **parameters)
 
     return make
 
@@ -118,6 +118,8 @@ def test_silences_are_missed_then_incapacitated_then_turn_off(
 ) -> None:
     begin = time.monotonic()
     repeat = 0.05  # s
+    commands = mock.Mock(wraps=operator_watchdog.engine_commands)
+    monkeypatch.setattr(operator_watchdog, "engine_commands", commands)
     watchdog = wired(silence=0.4, sampling=0.1, strikes=2, repeat=repeat)
     logged: list[str] = []
     threads: set[int] = set()
@@ -129,7 +131,7 @@ def test_silences_are_missed_then_incapacitated_then_turn_off(
 
     monkeypatch.setattr(logger, "warning", warn)
     monkeypatch.setattr(watchdog.service, "get_logger", lambda: logger)
-    spin_until(lambda: len(watchdog.heard[ENGINES.name]) >= 40)  # at the default period, they would take 20 s
+    spin_until(lambda: len(watchdog.heard[ENGINES.name]) >= 5)
     took = time.monotonic() - begin
 
     assert data(watchdog, OPERATOR_ACTIVITY) == [MISSED, MISSED, INCAPACITATED]
@@ -137,7 +139,8 @@ def test_silences_are_missed_then_incapacitated_then_turn_off(
     assert watchdog.heard[OPERATOR_PRESENCE.name] == []
     assert logged == [f"operator {MISSED}", f"operator {MISSED}", f"operator {INCAPACITATED}"]
     assert threads == {threading.get_ident()}, "that of the executor"
-    assert took >= 2 * 0.4 + 38 * repeat
+    assert took >= 2 * 0.4 + 3 * repeat
+    assert commands.mock_calls == [mock.call(mock.ANY, repeat=repeat)]
 
 
 def test_turn_off_does_not_wait_for_the_log(

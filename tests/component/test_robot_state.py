@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from datetime import timedelta
 from typing import Any
 from xml.etree import ElementTree
 
@@ -31,7 +32,7 @@ from interfaces.service import ServiceNode
 from interfaces.service.states import GAP, LATENESS, state
 from interfaces.topics import CONFIGURATION, CONTRACT, JOINT_STATES, ROBOT_DESCRIPTION, TF
 from reactive_node.signals import Signal
-from reactive_node.stamps import stamped
+from reactive_node.stamps import from_message, now, stamped
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
 from services.robot_state import Configuration, configurations, lengths, wire
 
@@ -204,11 +205,13 @@ def test_node_in_a_namespace_describes_its_arm(make_node: MakeNode, spin_until: 
     publishers = {
         name: peer.create_publisher(topic.type, name, topic.qos) for name, topic in CONFIGURATION.items()
     }
+    before = now()
     for name, publisher in publishers.items():
         publisher.publish(Float64(data=values[name]))
 
     spin_until(lambda: len(last) == len(VIEWED) + 1)
     state = last[JOINT_STATES.name]
+    assert before - timedelta(seconds=2 * LATENESS) <= from_message(state.header.stamp) <= now()
     assert dict(zip(state.name, state.position, strict=True)) == {"theta1": 0.5, "theta2": -0.25}
     assert last[ROBOT_DESCRIPTION.name].data == urdf(2.0, 3.0, "/arm1")
 
@@ -268,5 +271,7 @@ rclpy.shutdown()
 
 
 def test_without_tf2_msgs_the_arm_publishes_all_but_transforms(domain_id: int) -> None:
-    run = subprocess.run([sys.executable, "-c", WITHOUT_TF2_MSGS], capture_output=True, text=True, timeout=30)
+    run = subprocess.run(
+        [sys.executable, "-c", WITHOUT_TF2_MSGS], capture_output=True, text=True, timeout=150
+    )
     assert (run.stdout, run.stderr) == ("False joint_states robot_description\n", "")

@@ -199,7 +199,7 @@ def test_demo_has_no_speed_above_its_true_maximum(scheduler: TestScheduler, offs
 @pytest.mark.parametrize(
     "timeline", [Events(((1.0, "a"), (2.0, "b"))), Events(((1.0, "a"), (2.0, "b")), 5.0)]
 )
-def test_driven_joint_moves_with_its_time_and_tells_where_it_stands(
+def test_driven_joint_moves_with_its_time_and_reports_where_it_stands(
     scheduler: TestScheduler, timeline: Events[str]
 ) -> None:
     times = scheduler.create_hot_observable(

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import re
 import select
 import signal
@@ -14,12 +15,13 @@ import pytest
 from rclpy.node import Node
 from rclpy.utilities import get_rmw_implementation_identifier
 
+from deploy.supervision.processes import ROOT
 from interfaces.service import process
+from interfaces.service.middleware import PROFILES, RANGE
 from interfaces.topics import L1
 from reactive_node.testing import MakeNode, SpinUntil
 
 CYCLONE = get_rmw_implementation_identifier() == "rmw_cyclonedds_cpp"
-ROOT = Path(__file__).parents[2]
 
 HANGING = """
 from contextlib import suppress
@@ -132,7 +134,7 @@ class Process:
         """Wait, after a signal if given; return the exit code and the standard error."""
         if by is not None:
             self.popen.send_signal(by)
-        self.output, errors = self.popen.communicate(timeout=30)
+        self.output, errors = self.popen.communicate(timeout=150)
         return self.popen.returncode, errors
 
 
@@ -330,6 +332,40 @@ def test_mistyped_name_in_the_section_of_a_service_is_refused(
     assert errors.startswith("robot_state: raet: no such parameter; the parameters are ")
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "# robot_state:\n",
+        "{}",
+        "robot_state: {ros__parameters: {rate: !hertz 30.0}}",
+        "/x: {ros__parameters: {}}",
+    ],
+)
+def test_empty_or_tagged_parameter_file_starts_a_service(start: Start, tmp_path: Path, content: str) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(content)
+    assert start("-c", READY, "--ros-args", "--params-file", str(file)).wait_for_line() == "ready"
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("robot_state: {ros__parameters: {a: {b: 1}}}", "a.b: no such parameter; the parameters are "),
+        ("/**: {ros__parameters: {a: &a 1, b: *a}}", "line 1"),
+        ("robot_state:", "line 1"),
+    ],
+)
+def test_error_in_a_parameter_file_is_one_line(
+    start: Start, tmp_path: Path, content: str, reason: str
+) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(content)
+    code, errors = start("-m", "services.robot_state", "--ros-args", "--params-file", str(file)).end()
+    assert (code, errors.splitlines()[-1].startswith("robot_state: ")) == (2, True)
+    assert reason in errors.splitlines()[-1]
+
+
 def test_parameter_file_may_name_parameters_of_other_services(start: Start, tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text("/**: {ros__parameters: {rate: 30.0}}")
@@ -375,3 +411,24 @@ def test_service_has_no_shared_memory_and_is_seen_by_others(
     assert "/dev/shm/fastrtps" not in maps
     node = make_node(kind=Node)
     spin_until(lambda: "ready" in node.get_node_names())
+
+
+BEYOND = """
+from pathlib import Path
+import rclpy
+
+rclpy.init(args=[])
+node = rclpy.create_node("node")
+print("/dev/shm/fastrtps" in Path("/proc/self/maps").read_text())
+"""
+
+
+def test_process_of_an_arm_on_two_hosts_has_no_shared_memory(domain_id: int) -> None:
+    own = {RANGE: "SUBNET", PROFILES: str(ROOT / "deploy" / "fastdds.xml")}
+    alone = ["unshare", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up; exec "$0" -c "$1"']
+    done = subprocess.run(
+        [*alone, sys.executable, BEYOND], env=os.environ | own, capture_output=True, text=True
+    )
+    if "unshare" in done.stderr:
+        pytest.skip(f"platform: {done.stderr}")
+    assert done.stdout == "False\n", done.stderr

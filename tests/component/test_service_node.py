@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 import rclpy
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.context import Context
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -26,6 +26,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
 from interfaces.service import Rejected, ServiceNode, parameter
+from interfaces.service.parameters import Declaration
 from reactive_node.stamps import Timestamp, to_nanoseconds
 
 Make = Callable[..., Any]
@@ -36,13 +37,6 @@ SpinFor = Callable[[float], None]
 def one(name: str, default: Any, within: Any, meaning: str, *, unit: str = "", settable: bool = False) -> Any:
     field = parameter(default, within, unit, meaning, settable=settable)
     return dataclasses.make_dataclass("Parameters", [(name, type(default), field)], frozen=True)
-
-
-@pytest.fixture
-def service(make_node: Make, monkeypatch: pytest.MonkeyPatch) -> ServiceNode:
-    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
-    node: ServiceNode = make_node("service", kind=ServiceNode)
-    return node
 
 
 @pytest.fixture
@@ -63,7 +57,7 @@ def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[
 
     def following() -> dict[str, Any]:
         before = service.get_clock().now()
-        service.health._on_period()
+        service.health.on_period()
         # An earlier report, to a new subscriber, may arrive later.
         spin_until(lambda: heard and Time.from_msg(heard[-1].header.stamp) >= before)
         (status,) = heard[-1].status
@@ -77,15 +71,25 @@ def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[
     return following
 
 
-def test_health_tells_when_the_service_turned_off_the_engines(
-    service: ServiceNode, health: Callable[[], dict[str, Any]]
+def test_command_to_the_engines_is_followed_by_the_name_of_its_sender(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil
 ) -> None:
-    commands: Subject[str] = Subject()
+    heard: list[Any] = []
+    for topic in (topics.ENGINES, topics.ENGINES_SENDER):
+        peer.create_subscription(topic.type, topic.name, heard.append, topic.qos)
+    commands: Subject[Any] = Subject()
     service.publish(topics.ENGINES, commands)
-    commands.on_next(topics.TURN_ON)
-    assert "seconds_since_turn_off" not in health()
-    commands.on_next(topics.TURN_OFF)
-    assert float(health()["seconds_since_turn_off"]) >= 0.0
+    spin_until(lambda: service.count_subscribers(topics.ENGINES_SENDER.name))
+    for command in (Rejected(topics.ENGINES, "of a recipe"), "bad", topics.TURN_ON, topics.TURN_OFF):
+        commands.on_next(command)
+    spin_until(lambda: len(heard) == 4)
+
+    name = service.get_name()
+    assert [it.data for it in heard if isinstance(it, String)] == [topics.TURN_ON, topics.TURN_OFF]
+    assert [(it.key, it.value) for it in heard if isinstance(it, KeyValue)] == [
+        (topics.TURN_ON, name),
+        (topics.TURN_OFF, name),
+    ]
 
 
 def failing(_: Any) -> str:
@@ -157,9 +161,9 @@ def test_bad_messages_are_dropped_and_reported(
     assert report["dropped"] == str(len(bad))
     assert report["level"] == (DiagnosticStatus.WARN if bad else DiagnosticStatus.OK)
     if bad:
-        told = report["message"].split("; ")
-        assert told[0].startswith(f"{topic.name}: {topic.problem(topic.value(bad[0]))}")
-        assert all(len(remark) < 200 for remark in told)
+        remarks = report["message"].split("; ")
+        assert remarks[0].startswith(f"{topic.name}: {topic.problem(topic.value(bad[0]))}")
+        assert all(len(remark) < 200 for remark in remarks)
     following = health()
     assert (following["level"], following["message"]) == (DiagnosticStatus.OK, "running")
     assert following["dropped"] == str(len(bad))
@@ -197,7 +201,7 @@ def test_truncated_messages_are_dropped_and_reported(
     spin_until(lambda: received)
 
     assert received == [topic.value(message)]
-    assert f"{topic.name}: 8 octets are no {topic.type_name}" in health()["message"]
+    assert f"{topic.name}: cannot deserialize 8 bytes as {topic.type_name}" in health()["message"]
 
 
 def test_publisher_of_another_type_is_reported(
@@ -418,12 +422,13 @@ def test_remark_is_a_warning_without_a_dropped_message(
 def test_many_remarks_are_reported_as_four_reasons_and_a_count(
     service: ServiceNode, health: Callable[[], dict[str, Any]]
 ) -> None:
-    for number in range(40):
-        service.remark("l1", f"{number} is too much")
+    names = [f"l{number}" for number in range(40)]
+    for name in names:
+        service.remark("l1", f"{name} is too much")
 
-    told = health()["message"].split("; ")
+    remarks = health()["message"].split("; ")
 
-    assert told == [*(f"l1: {number} is too much" for number in range(4)), "l1: other reasons (36 times)"]
+    assert remarks == [*(f"l1: {name} is too much" for name in names[:4]), "l1: other reasons (36 times)"]
 
 
 # Parameters
@@ -454,6 +459,40 @@ def test_value_out_of_range_or_of_another_type_is_refused(make_node: Make, value
 
     with pytest.raises(wrong, match="rate"):
         node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
+
+
+def test_parameters_are_lists_or_have_no_default(make_node: Make) -> None:
+    names, word = one("names", ("a", "b"), None, "of joints"), one("word", Parameter.Type.STRING, None, "")
+    assert make_node("default", kind=ServiceNode).declare(names).names == ("a", "b")
+    assert make_node("typed", kind=ServiceNode).declare(word).word is None
+    given = [Parameter("names", value=["c"]), Parameter("word", value="y")]
+    node = make_node("given", kind=ServiceNode, parameter_overrides=given)
+    assert (node.declare(names).names, node.declare(word).word) == (["c"], "y")
+
+
+@pytest.mark.parametrize(
+    ("default", "value", "problem"),
+    [
+        (("a", "b"), ["y", "n"], ""),
+        (("a", "b"), ["y", 1], "must be a list of strings, not ['y', 1]"),
+        (("a", "b"), [], "must be a list of strings, not []"),
+        (("a", "b"), "a", "must be a list of strings, not 'a'"),
+        ((1.0,), [1], "must be a list of numbers with a decimal point, not [1]"),
+        ((True,), [False], ""),
+        (Parameter.Type.INTEGER, 5, ""),
+        (Parameter.Type.INTEGER, True, "must be an integer, not True"),
+        (Parameter.Type.STRING, None, "must be a string, not None"),
+        (1.0, {"a": 1}, "must be a number with a decimal point, not {'a': 1}"),
+    ],
+)
+def test_a_value_has_the_type_of_its_parameter(default: object, value: object, problem: str) -> None:
+    assert Declaration("x", default, None, "", "", False).problem(value) == problem
+
+
+@pytest.mark.parametrize("default", [(), None, {}, b"a", (1, "a"), Parameter.Type.BYTE_ARRAY])
+def test_a_parameter_has_a_type_that_files_can_hold(default: object) -> None:
+    with pytest.raises(TypeError, match="cannot be the default of a parameter"):
+        parameter(default, None, "", "")
 
 
 def test_only_settable_parameters_can_be_set_at_run_time(service: ServiceNode) -> None:
@@ -503,13 +542,15 @@ def test_new_subscriber_receives_the_health_at_once(
 
 
 def test_sampled_topic_is_read_at_its_ticks_only(
-    service: ServiceNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+    service: ServiceNode, peer: Node, spin_until: SpinUntil
 ) -> None:
     topic = topics.OPERATOR_HEARTBEAT
     sampled: list[Any] = []
     each: list[Any] = []
     service.observe_sampled(topic, 3600.0).subscribe(sampled.append)
-    spin_for(0.1)  # the first tick
+    ticked: list[Any] = []
+    service.scheduler.schedule_relative(0.1, lambda *_: ticked.append(True))  # type: ignore[func-returns-value]
+    spin_until(lambda: ticked)  # the first tick came before
     service.observe(topic).subscribe(each.append)
     publisher = peer.create_publisher(topic.type, topic.name, topic.qos)
     spin_until(lambda: publisher.get_subscription_count() == 2)

@@ -59,14 +59,14 @@ def test_late_samples_are_counted_and_reported_for_a_replay(
     reports: list[dict[str, str]] = []
     observed = Observed(make_node, spin_until)
     health = observed.service.health
-    publish = health._publisher.publish
+    publish = health.publisher.publish
 
     def keep(message: Any) -> None:
         (status,) = message.status
         reports.append({"message": status.message, **{pair.key: pair.value for pair in status.values}})
         publish(message)
 
-    monkeypatch.setattr(health._publisher, "publish", keep, raising=False)
+    monkeypatch.setattr(health.publisher, "publish", keep, raising=False)
     clock = observed.service.get_clock()
     ahead = round(2 * LATENESS * NS)
     late = clock.now().nanoseconds

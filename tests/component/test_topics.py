@@ -31,8 +31,8 @@ BEYOND = "{} is not from -1e+09 to 1e+09"
         (topics.EFFECTOR_POSITION, Position(0, 1.0, -1.0), ""),
         (topics.EFFECTOR_POSITION, Position(0, math.nan, 1.0), "(nan, 1.0) is not finite"),
         (topics.EFFECTOR_POSITION, Position(0, 1.0, math.inf), "(1.0, inf) is not finite"),
-        (topics.DRIVEN_TIME, 1e9, ""),
-        (topics.DRIVEN_TIME, 1e300, BEYOND.format("1e+300")),
+        (topics.DRIVEN_TIME, topics.DrivenTime(0, 1e9, "", ""), ""),
+        (topics.DRIVEN_TIME, topics.DrivenTime(0, 1e300, "", ""), BEYOND.format("1e+300")),
         (topics.THETA1, -1e9, ""),
         (topics.THETA1, -1000000001.0, BEYOND.format("-1000000001.0")),
         (topics.EFFECTOR_POSITION, Position(0, 1e10, 1.0), BEYOND.format("(10000000000.0, 1.0)")),
@@ -113,6 +113,7 @@ def test_topics_follow_those_that_they_are_made_of() -> None:
         "theta1": "driven_time",
         "theta2": "driven_time",
         "effector/speed": "effector/position",
+        "operator_hand": "operator_heartbeat",
         "operator_presence": "operator_heartbeat",
     }
 
@@ -125,7 +126,7 @@ def test_configuration_is_the_four_sources() -> None:
 
 @pytest.mark.parametrize("topic", topics.CONTRACT, ids=lambda topic: topic.name)
 def test_qos_is_the_described_one(topic: Topic) -> None:
-    described = topics._describe(topic.qos).split(", ")
+    described = topics.describe(topic.qos).split(", ")
 
     assert ("reliable" in described) == (topic.qos.reliability == ReliabilityPolicy.RELIABLE)
     assert ("best effort" in described) == (topic.qos.reliability == ReliabilityPolicy.BEST_EFFORT)
@@ -146,9 +147,26 @@ def _lifespan(nanoseconds: int) -> str:
     )
 
 
-def test_lifespan_is_told_if_there_is_one() -> None:
-    assert topics._describe(topics.DRIVEN_TIME.qos).endswith("last 1, lifespan 400 ms")
-    assert topics._describe(QoSProfile(depth=3)) == "reliable, volatile, last 3"
+@pytest.mark.parametrize(
+    ("topic", "qos"),
+    [
+        # A heartbeat that waits, or is sent again, is no sign of life: only the newest counts.
+        (topics.OPERATOR_HEARTBEAT, "best effort, volatile, last 1"),
+        (topics.OPERATOR_PRESENCE, "reliable, volatile, last 1"),
+        # A command must not get lost, and none may come again to a controller that restarts.
+        (topics.ENGINES, "reliable, volatile, last 10"),
+        # A drive that restarts knows at once that another controller has said `off`; an old `on` expires.
+        (topics.ENGINES_STATE, "reliable, transient local, last 1, lifespan 400 ms"),
+        (topics.DRIVEN_TIME, "reliable, volatile, last 1, lifespan 400 ms"),
+    ],
+)
+def test_qos_in_the_path_of_safety(topic: Topic, qos: str) -> None:
+    assert f"| `{topic.name}` | {topic.type_name.replace('/msg', '')} | {qos} |" in topics.markdown()
+
+
+def test_lifespan_is_reported_if_there_is_one() -> None:
+    assert topics.describe(topics.DRIVEN_TIME.qos).endswith("last 1, lifespan 400 ms")
+    assert topics.describe(QoSProfile(depth=3)) == "reliable, volatile, last 3"
 
 
 @pytest.mark.parametrize(

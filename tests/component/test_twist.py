@@ -7,16 +7,17 @@ from typing import Any
 
 import pytest
 from reactivex import Observable
+from reactivex.subject import Subject
 from std_msgs.msg import Float64
 
 from interfaces.service.states import state
 from interfaces.topics import CONFIGURATION, EFFECTOR_TWIST
-from reactive_node.signals import Answer
+from reactive_node.signals import CERTAIN, HELD, UNKNOWN, Answer
 from reactive_node.stamps import from_message, now, stamped
-from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
+from reactive_node.testing import SpinUntil, VirtualTime
 from services import twist
 from services.twist import PERIOD, effector_twist
-from tests.component.wiring import Wired
+from tests.component.wiring import Connect
 
 NS = 10**9
 RATE = 25.0  # Hz
@@ -117,16 +118,9 @@ def test_nothing_is_known_while_a_publisher_is_dead(scheduler: VirtualTime) -> N
 
 @pytest.mark.parametrize(("namespace", "frame"), [("", "base"), ("/arm1", "arm1/base")])
 def test_velocity_has_its_frame_and_its_time(
-    make_node: MakeNode, spin_until: SpinUntil, namespace: str, frame: str
+    connect: Connect, spin_until: SpinUntil, namespace: str, frame: str
 ) -> None:
-    wired = Wired(
-        make_node,
-        spin_until,
-        twist.wire,
-        inputs=CONFIGURATION.values(),
-        outputs=[EFFECTOR_TWIST],
-        namespace=namespace,
-    )
+    wired = connect(twist.wire, inputs=CONFIGURATION.values(), outputs=[EFFECTOR_TWIST], namespace=namespace)
     before = now()
     for topic in CONFIGURATION.values():
         wired.publish(topic, Float64(data=1.0))
@@ -138,3 +132,25 @@ def test_velocity_has_its_frame_and_its_time(
     linear, angular = heard[0].twist.linear, heard[0].twist.angular
     assert (linear.x, linear.y, angular.z) == (0.0, 0.0, 0.0)
     assert wired.remarks() == []
+
+
+def test_only_a_certain_velocity_is_sent_and_others_are_counted(
+    connect: Connect, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers: Subject[Answer[Any]] = Subject()
+    monkeypatch.setattr(twist, "effector_twist", lambda *_: answers)
+    wired = connect(twist.wire, outputs=[EFFECTOR_TWIST])
+    spin_until(lambda: answers.observers)
+    for time, mark in enumerate((CERTAIN, HELD, UNKNOWN, CERTAIN, HELD)):
+        answers.on_next(Answer(time, (0.1, 0.2, 0.3), mark))
+    spin_until(lambda: len(wired.heard[EFFECTOR_TWIST.name]) == 2)
+    wired.remarks()
+
+    heard = wired.heard[EFFECTOR_TWIST.name]
+    assert [it.header.stamp.nanosec for it in heard] == [0, 3]
+    assert {(it.twist.linear.x, it.twist.linear.y, it.twist.angular.z) for it in heard} == {(0.1, 0.2, 0.3)}
+    assert wired.reports()[-1]["uncertain"] == "3"
+
+    (viewer,) = [it for it in wired.peer.subscriptions if it.topic_name == f"/{EFFECTOR_TWIST.name}"]
+    wired.peer.destroy_subscription(viewer)
+    spin_until(lambda: not answers.observers)  # nobody looks

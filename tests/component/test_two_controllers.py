@@ -25,10 +25,11 @@ from reactivex.disposable import Disposable, SerialDisposable
 from reactivex.scheduler import CurrentThreadScheduler, VirtualTimeScheduler
 from reactivex.scheduler.scheduler import Scheduler
 
+from interfaces.latch import Command, Presence
 from interfaces.permission import NEVER, EngineState
 from interfaces.topics import CLOCK_TOLERANCE, DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
 from services import drive
-from services.engine_controller import Command, Parameters, Presence, engine_state
+from services.engine_controller import Parameters, engine_state, turns
 
 LENGTH = 300.0  # s of an experiment
 REPORT = 12  # experiments, an hour
@@ -104,7 +105,7 @@ class Controller:
         self._time, self._clock, self._say = time, clock, say
         self._commands, self._presences = Subject[Command](), Subject[Presence]()
         given = Parameters(repeat=chance.uniform(0.1, 0.2))
-        self._states = engine_state(self._commands, self._presences, given)
+        self._states = engine_state(turns(self._commands, self._presences, given))
         self._life = SerialDisposable()
         lives = [0.0, *_spells(chance, (5.0, 60.0), (0.1, 3.0))]
         for begin, end in zip(lives[::2], lives[1::2], strict=False):
@@ -112,7 +113,7 @@ class Controller:
             time.at(end, lambda: self._life.set_disposable(Disposable()))
 
     def command(self, name: str, stamp: float) -> None:
-        self._commands.on_next(Command(self._time.now, self._age(stamp), name, clocks=""))
+        self._commands.on_next(Command(self._time.now, self._age(stamp), name))
 
     def see(self, stamp: float) -> None:
         self._presences.on_next(Presence(self._time.now, self._age(stamp)))
@@ -178,7 +179,8 @@ def fight(seed: str) -> Fight:
 
     controllers = [controller(host) for host in HOSTS]
     lines = [[line(of, host, controllers[host].process) for host in HOSTS] for of in HOSTS]
-    drive.driven_time(heard, 0.0, chance.uniform(0.04, 0.2)).subscribe(move, scheduler=time)
+    times = drive.driven_time(heard, 0.0, chance.uniform(0.04, 0.2), keep=lambda _: True)
+    times.subscribe(move, scheduler=time)
     see()
     command()
     # Within an action of this scheduler, a subscription costs RxPY less.

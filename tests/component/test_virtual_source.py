@@ -24,7 +24,9 @@ from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import EPOCH, Epoch
 from interfaces.sources.player import Player
 from interfaces.sources.settings import Settings
+from interfaces.sources.settings_file import SettingsFile
 from interfaces.sources.timeline import Events, Sweep
+from tests.users import NOBODY, needs_root
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -312,6 +314,21 @@ def test_setting_replaces_a_scenario_that_has_not_begun(make_source: Make, spin_
     assert pressed == [False]
 
 
+def test_number_that_could_not_be_kept_is_not_taken_for_kept(
+    make_source: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = Source(make_source(settings=str(tmp_path / "settings")))
+
+    def fails(_: SettingsFile) -> None:
+        raise UserError("the disk is full")
+
+    assert source.settings.remember("time", 1.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(SettingsFile, "save", fails)
+        assert [source.settings.remember("time", 2.0) for _ in range(2)] == [False, False]
+    assert source.settings.remember("time", 2.0)
+
+
 def test_setting_ends_single_heartbeats_for_good(
     make_source: Make, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
 ) -> None:
@@ -393,9 +410,12 @@ def test_restart_without_its_settings_presses_no_switch(
 
 
 def test_late_first_start_is_no_restart(restart: Callable[[], list[bool]], tmp_path: Path) -> None:
-    RunDirectory(tmp_path).forget_settings(["source"])
+    run = RunDirectory(tmp_path)
+    run.forget_settings(["source"])
+    started = restart()
+    run.remove_settings()
 
-    assert restart() == [True]  # as the scenario says
+    assert started == [True]  # as the scenario says
 
 
 def test_setting_that_cannot_be_kept_leaves_no_old_one(
@@ -410,6 +430,17 @@ def test_setting_that_cannot_be_kept_leaves_no_old_one(
     node.destroy_node()
 
     assert restart() == [False]
+
+
+@needs_root
+def test_settings_of_another_user_are_refused(make_source: Make, tmp_path: Path) -> None:
+    node = make_source(settings=str(tmp_path / "settings"))
+    (tmp_path / "settings").mkdir()
+    (tmp_path / "settings" / "source.yaml").write_text("pressed: true\n")
+    os.chown(tmp_path / "settings", NOBODY, NOBODY)
+
+    with pytest.raises(UserError, match="belongs to another user"):
+        Source(node)
 
 
 def full_disk(*arguments: Any) -> None:

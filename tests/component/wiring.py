@@ -21,8 +21,8 @@ class Wired:
         spin_until: SpinUntil,
         wire: Callable[[ServiceNode], None],
         *,
-        inputs: Sequence[Topic],
-        outputs: Sequence[Topic],
+        inputs: Sequence[Topic] = (),
+        outputs: Sequence[Topic] = (),
         namespace: str = "",
         **parameters: Any,
     ) -> None:
@@ -71,3 +71,7 @@ class Wired:
     def _health(self) -> list[Any]:
         name = self.service.get_fully_qualified_name()
         return [message for message in self.heard[DIAGNOSTICS.name] if message.status[0].name == name]
+
+
+Connect = Callable[..., Wired]
+"""Connects a wired service with a peer: :class:`Wired` without its first two arguments."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from html import escape
 
 from tests.promises.findings import VIOLATED, Finding, percentile
 from tests.promises.history import (
@@ -17,13 +16,13 @@ from tests.promises.history import (
     NO_TARGET,
     OUTPUTS,
     OVERLOAD,
-    PROGRAMS,
     History,
     InjectedFault,
     Sample,
     running,
     target_name,
 )
+from tests.promises.markup import plain_html
 
 LEFT, ROW, BAR = 150, 26, 14  # px: names of rows, rows, bars
 PER_SECOND, PER_SECOND_LONG, NARROWEST = 8.0, 3.0, 1000.0  # px of a timeline
@@ -33,8 +32,8 @@ TOP, HISTOGRAM, BIN = 10, 140, 0.1  # px, px, s of a histogram
 SHORT_AXIS, LONG_AXIS = 2.2, 5.2  # s
 
 COLORS = """
-:root { color-scheme: light dark; --back: #fbfbf9; --text: #1d2327; --soft: #6b747b; --line: #d9dcd8;
-  --card: #fff; --good: #2a8f62; --bad: #cf3d3d; --open: #a9812b; --one: #b9d3ea; --two: #8fb6da;
+:root { color-scheme: light dark; --back: #fbfbf9; --text: #1d2327; --soft: #626b72; --line: #d9dcd8;
+  --card: #fff; --good: #1f7a51; --bad: #c23434; --open: #856313; --one: #b9d3ea; --two: #8fb6da;
   --flow: #2b6ca3; --lasting: #e9a23b; --on: #2a8f62; }
 @media (prefers-color-scheme: dark) { :root { --back: #14181b; --text: #e4e7e9; --soft: #98a2a9;
   --line: #333b41; --card: #1b2024; --good: #4cc38a; --bad: #ff6b6b; --open: #e0b354; --one: #2d4a63;
@@ -42,6 +41,7 @@ COLORS = """
 """
 STYLE = """
 svg text { font: 12px system-ui, sans-serif; fill: var(--text); } svg .soft { fill: var(--soft); }
+svg .mark { paint-order: stroke; stroke: var(--card); stroke-width: 3px; }
 svg .title { font-size: 14px; font-weight: 600; }
 svg .figures { white-space: pre; }
 svg .grid { stroke: var(--line); } svg .bound { stroke: var(--bad); stroke-dasharray: 4 3; }
@@ -52,7 +52,8 @@ svg .card { fill: var(--card); stroke: var(--line); }
 """
 
 SUPERVISORD = "supervisord"
-ROWS = ("operator", "engines", target_name(NO_TARGET), SUPERVISORD, *PROGRAMS)
+ROWS = ("operator", "engines", target_name(NO_TARGET), SUPERVISORD)
+"""The rows above those of the programs."""
 
 
 def framed(picture: str, width: float, height: float, title: str) -> str:
@@ -62,7 +63,7 @@ def framed(picture: str, width: float, height: float, title: str) -> str:
     content = [
         _tag("style", COLORS + STYLE),
         _tag("rect", class_="card", x=0.5, y=0.5, width=outer_width - 1, height=outer_height - 1, rx=8),
-        _tag("text", escape(title), class_="title", x=margin, y=margin + 12),
+        _tag("text", plain_html(title), class_="title", x=margin, y=margin + 12),
         _tag("g", picture, transform=f"translate({margin} {margin + heading})"),
     ]
     return _svg(outer_width, outer_height, title, content) + "\n"
@@ -76,7 +77,8 @@ def timeline(history: History, findings: Sequence[Finding] = ()) -> tuple[str, f
     """
     scale = PER_SECOND if history.end < LONG else PER_SECOND_LONG
     scale = max(scale, (NARROWEST - LEFT) / max(history.end, 1.0))
-    axis = ROW * len(ROWS)
+    rows = *ROWS, *history.programs
+    axis = ROW * len(rows)
     width, height = LEFT + scale * history.end + 20, axis + 2 * ROW
 
     def x(time: float) -> float:
@@ -88,7 +90,7 @@ def timeline(history: History, findings: Sequence[Finding] = ()) -> tuple[str, f
         parts.append(_tag("line", class_="grid", x1=x(time), x2=x(time), y1=0, y2=axis))
         label = _tag("text", f"{time} s", class_="soft", x=x(time), y=axis + 18, text_anchor="middle")
         parts.append(label)
-    for number, row in enumerate(ROWS):
+    for number, row in enumerate(rows):
         top = number * ROW + 4
         parts.append(_tag("text", row, x=0, y=top + 12))
         for begin, end, kind, offset, tall in _bars(history, row):
@@ -98,7 +100,7 @@ def timeline(history: History, findings: Sequence[Finding] = ()) -> tuple[str, f
         parts += _marks(history, row, x, top)
     for finding in findings:
         for evidence in finding.evidence:
-            tip = _tag("title", escape(f"{finding.promise}: {evidence.text}"))
+            tip = _tag("title", plain_html(f"{finding.promise}: {evidence.words}"))
             at = x(evidence.time)
             parts.append(_tag("line", tip, class_="bound", x1=at, x2=at, y1=0, y2=axis))
     parts += _legend(axis + ROW + 8, history, findings)
@@ -112,8 +114,8 @@ def _bars(history: History, row: str) -> Iterator[tuple[float, float, str, int, 
     elif row == "engines":
         yield from ((b, e, "on", 0, BAR) for b, e in _joined(running(history)))
     elif row == target_name(NO_TARGET):
-        missed = (f for f in history.faults if f.kind in (OVERLOAD, LOSS))
-        yield from ((f.begin, f.end, "missed", 0, BAR) for f in missed)
+        missed = (each for each in history.conditions if each.kind in (OVERLOAD, LOSS))
+        yield from ((each.begin, each.end, "missed", 0, BAR) for each in missed)
     else:
         program = "" if row == SUPERVISORD else row
         for number, life in enumerate(life for life in history.lives if life.program == program):
@@ -145,7 +147,7 @@ def _flow(samples: Sequence[Sample], longest_gap: float) -> Iterator[tuple[float
 
 def _marks(history: History, row: str, x: Callable[[float], float], top: int) -> Iterator[str]:
     """Yield the faults of a row, each with its number and, where there is room, its kind."""
-    faults = [each for each in enumerate(history.injected, start=1) if row in _rows(each[1])]
+    faults = [each for each in enumerate(history.faults, start=1) if row in _rows(history, each[1])]
     places = [*(x(fault.begin) for _, fault in faults), math.inf]
     for (number, fault), left, following in zip(faults, places, places[1:], strict=False):
         if (end := history.effect_end(fault)) - fault.begin >= 0.1:
@@ -155,13 +157,13 @@ def _marks(history: History, row: str, x: Callable[[float], float], top: int) ->
         label = f"{number} {fault.kind}"
         if CHARACTER * len(label) + 8 > following - left:
             label = str(number)
-        yield _tag("text", escape(label), x=left + 5, y=top + 11)
+        yield _tag("text", plain_html(label), class_="mark", x=left + 5, y=top + 11)
 
 
-def _rows(fault: InjectedFault) -> tuple[str, ...]:
+def _rows(history: History, fault: InjectedFault) -> Sequence[str]:
     if fault.kind == "kill_supervisor":
         return (SUPERVISORD,)
-    return PROGRAMS if fault.target == ALL else (target_name(fault.target),)
+    return history.programs if fault.target == ALL else (target_name(fault.target),)
 
 
 def _legend(y: float, history: History, findings: Sequence[Finding]) -> Iterator[str]:
@@ -173,7 +175,7 @@ def _legend(y: float, history: History, findings: Sequence[Finding]) -> Iterator
         ("momentary", "fault"),
         ("lasting", "lasting fault"),
     ]
-    if any(fault.kind in (OVERLOAD, LOSS) for fault in history.faults):
+    if any(each.kind in (OVERLOAD, LOSS) for each in history.conditions):
         symbols.append(("missed", "record may be incomplete"))
     if any(finding.verdict == VIOLATED for finding in findings):
         symbols.append(("bound", "promise violated"))
@@ -213,7 +215,7 @@ def histograms(durations: dict[str, list[float]], bounds: Sequence[float]) -> st
     parts += [_tag("line", class_="bound", x1=x(b), x2=x(b), y1=TOP, y2=height) for b in bounds]
     for number, (program, values) in enumerate(sorted(durations.items())):
         middle = bottom + 42 + ROW * number
-        parts.append(_tag("text", escape(program), x=0, y=middle + 4))
+        parts.append(_tag("text", plain_html(program), x=0, y=middle + 4))
         parts += [_tag("circle", class_="flow", fill_opacity=0.5, cx=x(v), cy=middle, r=4) for v in values]
         median, slow = (f"{percentile(values, p):.2f}" for p in (50, 99))
         summary = f"{len(values)}   {median}   {slow}   {max(values):.2f}"
@@ -236,7 +238,7 @@ def _histogram(values: Sequence[float], x: Callable[[float], float], axis: float
 def _svg(width: float, height: float, label: str, parts: Sequence[str]) -> str:
     size = {"width": math.ceil(width), "height": math.ceil(height)}
     namespace = "http://www.w3.org/2000/svg"
-    return _tag("svg", "".join(parts), xmlns=namespace, role="img", aria_label=escape(label), **size)
+    return _tag("svg", "".join(parts), xmlns=namespace, role="img", aria_label=plain_html(label), **size)
 
 
 def _tag(name: str, content: str = "", **attributes: str | float) -> str:

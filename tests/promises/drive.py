@@ -1,24 +1,38 @@
 """The checker of S6: a pure function from a history to a finding.
 
 A joint that differs between two samples has moved at some time between them. So it has certainly moved too
-late if the first of the two was late: the promise allows one sample more than S1.
+late if the first of the two was late: the promise allows one sample more than S1. And it has jumped, whenever
+that was, if it went further than its scenario moves it, as between the times of two drives.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from operator import itemgetter
+from typing import Any
 
 from interfaces import topics
-from tests.promises.effects import MISSED, disturbing, effects
+from interfaces.service.health import BY_HAND, FASTEST
+from tests.promises import claims
+from tests.promises.effects import MISSED, Effect, disturbing
 from tests.promises.findings import Evidence, Finding
 from tests.promises.history import SWITCH, History, between, gaps
 
+WINDOW = 1.0  # s in which the path of a joint is measured
+AT_ONCE = topics.DRIVE_TIMEOUT + 0.2
+"""s of its track that a joint may play at once: driven times that have waited, and a step of the drive."""
 
-def joints_stand_in_time(history: History) -> Finding:
-    """S6: with a drive, no joint moves later than S1 allows after the operator's last sign of life."""
-    found, allowed = effects(history), history.reaction.off_within
-    evidence, cases, unknown, longest = [], 0, 0, 0.0
+
+def joints_stand_in_time(history: History, found: Sequence[Effect]) -> Finding:
+    """S6: with a drive, no joint jumps, or moves later than S1 allows after the last sign of life."""
+    allowed = history.reaction.off_within
+    evidence = [jump for joint in topics.JOINTS for jump in _jumps(history, joint)]
+    evidence += claims.driven_time_never_goes_back(history)
+    evidence += claims.drive_runs_by_a_young_on(history, found)
+    cases, unknown, longest = 0, 0, 0.0
     alive = [s.sent for s in history.signs_of_life()] if history.stream(topics.DRIVEN_TIME) else []
     for begin, end in gaps(alive, -math.inf, history.end) if alive else ():
         if end - begin <= allowed:
@@ -39,10 +53,54 @@ def joints_stand_in_time(history: History) -> Finding:
         longest = max(longest, last - since)
         cases += 1
     measured = f"joints stood within {longest:.2f} s, allowed {allowed:g} s"
-    return Finding("S6", cases, measured, evidence, unknown, worst=longest)
+    return Finding("S6", cases, measured, sorted(evidence), unknown, worst=longest)
+
+
+def _jumps(history: History, joint: topics.Topic) -> Iterator[Evidence]:
+    """Yield when a joint that follows a drive went further in a window than its scenario moves it."""
+    reports = _reports(history, joint)
+    steps = [(one, two) for one, two in itertools.pairwise(history.stream(joint)) if one.value != two.value]
+    times = [two.sent for _, two in steps]
+    found = -math.inf
+    for last, time in enumerate(times):
+        if time < found + WINDOW:
+            continue
+        first = bisect_left(times, time - WINDOW)
+        begin = steps[first][0].sent
+        path = sum(abs(two.value - one.value) for one, two in steps[first : last + 1])
+        fastest = max(report.get(FASTEST, math.inf) for report in _around(reports, begin, time))
+        allowed = fastest * (time - begin + AT_ONCE)
+        if path > allowed:
+            found = time
+            moved = f"{path:.2f} rad in {time - begin:.2f} s, at most {allowed:.2f} is right"
+            yield Evidence(time, f"{joint.name} jumped: {moved}")
+
+
+def _reports(history: History, joint: topics.Topic) -> list[tuple[float, dict[str, Any]]]:
+    """Return when the source of a joint reported its health, and what it reported of the movement."""
+    every = history.stream(topics.DIAGNOSTICS)
+    return [(each.sent, dict(each.value[2:])) for each in every if each.value[0] == joint.publishers[0]]
+
+
+def _around(reports: list[tuple[float, dict[str, Any]]], begin: float, end: float) -> list[dict[str, Any]]:
+    """Return the reports from before a time to after another one; ``{}`` if one is missing."""
+    first = bisect_left(reports, begin, key=itemgetter(0)) - 1
+    last = bisect_left(reports, end, key=itemgetter(0))
+    known = [report for _, report in reports[max(first, 0) : last + 1]]
+    return [*known, {}] if first < 0 or last == len(reports) else known
 
 
 def _last_move(history: History, joint: topics.Topic, begin: float, end: float) -> float:
-    """Return the time of the last sample before a joint moved between two times; -∞ if it stood still."""
+    """Return the time of the last sample before a joint moved between two times; -∞ if it stood still.
+
+    A joint that was set by hand has not moved.
+    """
+    reports = _reports(history, joint)
     samples = itertools.pairwise(between(history.stream(joint), begin, end))
-    return max((one.sent for one, two in samples if one.value != two.value), default=-math.inf)
+    moves = (pair for pair in samples if pair[0].value != pair[1].value)
+    driven = (
+        one.sent
+        for one, two in moves
+        if not any(BY_HAND in report for report in _around(reports, two.sent, two.sent))
+    )
+    return max(driven, default=-math.inf)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 HOLDS, VIOLATED, UNKNOWN = "holds", "VIOLATED", "unknown"
@@ -15,6 +15,12 @@ class Evidence(NamedTuple):
 
     time: float
     text: str
+    cause: str = ""
+    """Who had to act, and did not, as far as the record shows it."""
+
+    @property
+    def words(self) -> str:
+        return f"{self.text}: {self.cause}" if self.cause else self.text
 
 
 @dataclass(frozen=True)
@@ -32,8 +38,8 @@ class Finding:
     """How often the promise was exercised and the record does not show the outcome."""
     times: dict[str, list[float]] = field(default_factory=dict)
     """Durations [s] by program, for a promise about durations."""
-    worst: float = math.nan
-    """The longest duration [s], for a promise that limits one."""
+    worst: float = -math.inf
+    """The longest duration [s], for a promise that limits one and saw one."""
 
     @property
     def verdict(self) -> str:
@@ -50,6 +56,28 @@ def overall(findings: Sequence[Finding]) -> str:
     """Return VIOLATED if a promise is violated, HOLDS if none is and one holds, and UNKNOWN otherwise."""
     verdicts = {finding.verdict for finding in findings}
     return next((verdict for verdict in (VIOLATED, HOLDS) if verdict in verdicts), UNKNOWN)
+
+
+def merged(findings: Sequence[Finding]) -> Finding:
+    """Return the findings about one promise in several records as one."""
+    times: dict[str, list[float]] = {}
+    for finding in findings:
+        for program, values in finding.times.items():
+            times.setdefault(program, []).extend(values)
+    worst = max(findings, key=lambda finding: finding.worst)
+    every = [time for values in times.values() for time in values]
+    measured = worst.measured if worst.worst > -math.inf else ""
+    if worst.promise == "L1" and every:
+        p50, p99 = percentile(every, 50), percentile(every, 99)
+        measured = f"p50 {p50:.2f} s, p99 {p99:.2f} s, at most {max(every):.2f} s"
+    return replace(
+        worst,
+        cases=sum(finding.cases for finding in findings),
+        unknown=sum(finding.unknown for finding in findings),
+        evidence=[each for finding in findings for each in finding.evidence],
+        measured=measured,
+        times=times,
+    )
 
 
 def percentile(values: Sequence[float], percent: float) -> float:

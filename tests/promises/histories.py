@@ -11,7 +11,7 @@ from typing import Any
 
 from interfaces import topics
 from interfaces.robot_model import forward_kinematics
-from tests.promises.history import PROGRAMS, History, InjectedFault, Life, Sample
+from tests.promises.history import Condition, History, InjectedFault, Life, Sample, programs_of_manifest
 
 END = 60.0
 RATES: dict[str, float] = {
@@ -47,10 +47,9 @@ def good() -> History:
             streams["effector/speed"].append(Sample(t, t + 0.001, 0.5))
     streams["joint_states"] = [Sample(t, t + 0.001, None) for t in _times(25.0)]
     streams["engines"] = [Sample(4.95, 4.951, topics.TURN_ON)]
-    streams["/diagnostics"] = sorted(
-        Sample(t, t + 0.001, (name, 100 + index)) for t in _times(1.0) for index, name in enumerate(PROGRAMS)
-    )
-    lives = [Life(name, 100 + index, 0.0, None) for index, name in enumerate(PROGRAMS)]
+    pids = {name: 100 + index for index, name in enumerate(programs_of_manifest())}
+    streams["/diagnostics"] = sorted(Sample(t, t + 0.001, each) for t in _times(1.0) for each in pids.items())
+    lives = [Life(name, pid, 0.0, None) for name, pid in pids.items()]
     return History(END, streams, [Life("", 99, 0.0, None), *lives], [])
 
 
@@ -59,7 +58,9 @@ def _value(name: str, time: float) -> Any:
         return True
     if name == "engines/state":
         return topics.ON if time >= 5.0 else topics.OFF
-    return time if name in ("operator_presence", "driven_time") else value_at(name, time)
+    if name == "driven_time":
+        return max(0.0, time - 5.5), "host"
+    return time if name == "operator_presence" else value_at(name, time)
 
 
 def _latest(samples: list[Sample], time: float) -> Any:
@@ -85,8 +86,14 @@ def added(history: History, topic: str, *samples: tuple[float, Any]) -> History:
     return replace(history, streams=history.streams | {topic: sorted([*history.streams[topic], *new])})
 
 
-def faulty(history: History, *faults: InjectedFault) -> History:
-    return replace(history, faults=sorted([*history.faults, *faults], key=lambda f: f.begin))
+def faulty(history: History, *events: InjectedFault | Condition) -> History:
+    faults = [*history.faults, *(each for each in events if isinstance(each, InjectedFault))]
+    conditions = [each for each in events if isinstance(each, Condition)]
+    return replace(
+        history,
+        faults=sorted(faults, key=lambda f: f.begin),
+        conditions=[*history.conditions, *conditions],
+    )
 
 
 def killed(history: History, program: str, at: float, back: float) -> History:

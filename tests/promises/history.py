@@ -17,7 +17,6 @@ from deploy.supervision import manifest
 from deploy.supervision.reaction import Reaction, reaction
 from interfaces import topics
 
-PROGRAMS = tuple(program.name for program in manifest.programs())
 SWITCH, WATCHDOG, CONTROLLER = "dead_mans_switch", "operator_watchdog", "engine_controller"
 KINEMATICS, VELOCITY, ROBOT_STATE = "kinematics", "velocity", "robot_state"
 DRIVE = "drive"
@@ -30,9 +29,13 @@ OPERATOR, ALL, NO_TARGET = "operator", "all", "nothing"
 
 OVERLOAD, LOSS, SILENCE = "overload", "loss", "silence"
 CONDITIONS = (OVERLOAD, LOSS, SILENCE)
-"""Recorded like faults, but not injected into a process: the observer was not scheduled in time, messages
-to it were lost, the operator released the switch."""
+"""The kinds of conditions: the observer was not scheduled in time, messages to it were lost, the operator
+released the switch."""
 
+HOST = "host"
+SAID = "said"
+"""The message of a report of health that warns."""
+"""In the value of a health report, the name of the reporter's host."""
 PARTITION = "partition"
 """A fault of the network between the operator's host and the robot's."""
 BAD_LINE = "bad_line"
@@ -41,32 +44,39 @@ FALSE_PRESENCE = "false_presence"
 """A stranger reports the operator's presence, so the engine controller does not turn off by itself (F2)."""
 STUCK_DRIVE = "stuck_drive"
 """The drive keeps its last command, whether it is repeated or not (F3)."""
+FUTURE_PRESENCE = "future_presence"
+"""A stranger reports the operator's presence by a clock that is ahead by more than A3 allows."""
+RIVAL = "rival"
+"""A second controller, on another host, contradicts the first one."""
+LOSE = "lose"
+"""The messages that are sent on a topic in this time are lost; the topic is the target."""
 HOLD = "hold"
 """The messages that are sent on a topic in this time arrive together at its end; the topic is the target."""
 
-SUSPENDING = ("stop", "hang", "hog", "slow")
+SUSPENDING = ("stop", "pause", "hang", "hog", "slow")
 """Faults in which a process receives nothing until it continues or is replaced."""
 
 
-def _output(program: str) -> topics.Topic | None:
-    own = (topic for topic in topics.CONTRACT if topic.publishers[0] == program)
-    return next((topic for topic in own if topic.longest_gap < math.inf), None)
+def _outputs() -> dict[str, topics.Topic]:
+    found: dict[str, topics.Topic] = {}
+    for topic in topics.CONTRACT:
+        if topic.longest_gap < math.inf and topic is not topics.DIAGNOSTICS:
+            found.setdefault(topic.publishers[0], topic)
+    return found
 
 
-OUTPUTS = {program: topic for program in PROGRAMS if (topic := _output(program))}
+OUTPUTS = _outputs()
 """The topic that shows whether a program works: the first one that names it as its first publisher. The
 health shows it for the other programs."""
 
 
 def _dependents(program: str) -> tuple[str, ...]:
-    if program not in OUTPUTS:
-        return ()
     direct = [name for name, topic in OUTPUTS.items() if topic.follows == OUTPUTS[program].name]
     return (*direct, *itertools.chain.from_iterable(map(_dependents, direct)))
 
 
 DEPENDENTS = {
-    **{program: _dependents(program) for program in PROGRAMS},
+    **{program: _dependents(program) for program in OUTPUTS},
     OPERATOR: (SWITCH, *_dependents(SWITCH)),
 }
 """The programs whose output stops when that of a program stops, or when the operator releases the switch."""
@@ -76,13 +86,18 @@ NEEDED_AT_START = dict.fromkeys((KINEMATICS, ROBOT_STATE), SOURCES)
 """The programs without which a program has no output after a restart: it needs a value from each of them."""
 
 
+def programs_of_manifest() -> tuple[str, ...]:
+    """Return the names of the programs of the manifest."""
+    return tuple(program.name for program in manifest.programs())
+
+
 class Sample(NamedTuple):
     sent: float
     """DDS source time."""
     received: float
     value: Any
     """The content: a float, a bool or a string; (x, y) of a position, (node, pid) of a health report, then
-    (name, value) of each parameter that is not the default."""
+    (name, value) of each parameter that is not the default, what it reports of a movement, and its host."""
 
 
 class Life(NamedTuple):
@@ -97,7 +112,7 @@ class Life(NamedTuple):
 
 
 class InjectedFault(NamedTuple):
-    """A fault and its target, or a condition (:data:`CONDITIONS`)."""
+    """A fault and its target."""
 
     kind: str
     target: str
@@ -111,35 +126,44 @@ class InjectedFault(NamedTuple):
     """The lead of the arm's time of day over the machine's after the fault [s]."""
 
 
+class Condition(NamedTuple):
+    """What was the case for a while, without a fault: one of :data:`CONDITIONS`."""
+
+    kind: str
+    begin: float
+    end: float
+
+
 @dataclass(frozen=True)
 class History:
-    """The messages, processes and faults of one arm."""
+    """The messages, processes, faults and conditions of one arm."""
 
     end: float
     streams: dict[str, list[Sample]] = field(default_factory=dict)
     """By topic name of the contract, in the order of sending."""
     lives: list[Life] = field(default_factory=list)
     faults: list[InjectedFault] = field(default_factory=list)
-    absent: frozenset[str] = frozenset()
-    """Programs that this arm does not have."""
+    conditions: list[Condition] = field(default_factory=list)
+    programs: Sequence[str] = field(default_factory=programs_of_manifest)
+    """Those that this arm has."""
 
     def lacks(self, program: str) -> bool:
         """Return whether the arm does not have a program. Without a drive, that program does nothing."""
-        return program in self.absent or (program == DRIVE and not self.stream(topics.DRIVEN_TIME))
+        return program not in self.programs or (program == DRIVE and not self.stream(topics.DRIVEN_TIME))
 
     @cached_property
-    def reaction(self) -> Reaction:
-        """How soon the engines must stop, by the parameters that the services report."""
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """What the services report, by program: each parameter with another value than its default."""
         given: dict[str, dict[str, Any]] = {}
         for sample in self.stream(topics.DIAGNOSTICS):
             node, _, *parameters = sample.value
             given.setdefault(node, {}).update(parameters)
-        return reaction(given)
+        return given
 
-    @property
-    def injected(self) -> list[InjectedFault]:
-        """The faults without the conditions."""
-        return [fault for fault in self.faults if fault.kind not in CONDITIONS]
+    @cached_property
+    def reaction(self) -> Reaction:
+        """How soon the engines must stop, by the parameters that the services report."""
+        return reaction(self.parameters)
 
     def stream(self, topic: topics.Topic) -> list[Sample]:
         return self.streams.get(topic.name, [])
@@ -148,6 +172,10 @@ class History:
         """Return the messages that show that a program works."""
         if topic := OUTPUTS.get(program):
             return self.stream(topic)
+        return self.health(program)
+
+    def health(self, program: str) -> list[Sample]:
+        """Return the reports of health of a program."""
         return [s for s in self.stream(topics.DIAGNOSTICS) if s.value[0] == program]
 
     def signs_of_life(self) -> list[Sample]:
@@ -159,7 +187,7 @@ class History:
         return [life for life in lives if not any(_outlives(older, life) for older in lives)]
 
     def effect_end(self, fault: InjectedFault) -> float:
-        """Return when a fault stopped to matter: at its end, or earlier if its target was replaced."""
+        """Return when a fault ended, or earlier, when its target was replaced."""
         if fault.kind not in SUSPENDING:
             return fault.end
         target = (fault.target, fault.pid)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
 
+from tests.promises.account import account
 from tests.promises.charts import COLORS, LEFT, STYLE, histograms, timeline
-from tests.promises.findings import UNKNOWN, VIOLATED, Finding, count, overall
+from tests.promises.findings import HOLDS, UNKNOWN, VIOLATED, Finding, count
 from tests.promises.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
 from tests.promises.limits import DURATIONS
+from tests.promises.markup import plain_html
 from tests.promises.promises import meaning
 
 SHOWN = 10  # pieces of evidence of a promise
+WORST_FIRST = (VIOLATED, UNKNOWN, HOLDS)
 EFFECT = 5.0  # s after a fault in which the end of a process is its effect, unless another fault follows
 
 PAGE_STYLE = """
@@ -31,6 +33,7 @@ th { color: var(--soft); font-weight: 500; font-size: 13px; }
 .verdict { font-weight: 600; white-space: nowrap; } .holds { color: var(--good); }
 .violated { color: var(--bad); } .unknown { color: var(--open); }
 .evidence { color: var(--bad); font-size: 13px; }
+.chart:focus-visible { outline: 2px solid var(--flow); }
 @media (max-width: 900px) {
   body { padding: 16px; overflow-wrap: anywhere; }
   .card { padding: 8px 12px; }
@@ -38,8 +41,10 @@ th { color: var(--soft); font-weight: 500; font-size: 13px; }
   tr { padding: 8px 0; border-bottom: 1px solid var(--line); } tr:last-child { border: 0; }
   tr:has(th) { display: none; }
   td, td.number { padding: 2px 0; border: 0; text-align: left; } .sentence { min-width: 0; }
-  td:not([data-title=""])::before { content: attr(data-title) " "; color: var(--soft); font-size: 13px; }
-  td[data-title=""] { font-weight: 600; }
+  td:is(.inline, .number) { display: inline; padding-right: 12px; }
+  td::before { content: attr(data-title) " "; color: var(--soft); font-size: 13px; }
+  td:is([data-title=name], [data-title=verdict], [data-title=promise])::before { display: none; }
+  td.inline { font-weight: 600; }
 }
 """
 LEGEND = (
@@ -51,22 +56,26 @@ LEGEND = (
 def verdict(findings: Sequence[Finding]) -> str:
     if broken := [finding.promise for finding in findings if finding.verdict == VIOLATED]:
         return f"{', '.join(broken)} violated"
-    if undecided := [f.promise for f in findings if f.verdict == UNKNOWN and f.unknown]:
-        return f"No promise is violated, but the outcome for {', '.join(undecided)} is unknown"
-    if all(finding.verdict == UNKNOWN for finding in findings):
+    open_ = [finding for finding in findings if finding.verdict == UNKNOWN]
+    undecided = [finding.promise for finding in open_ if finding.unknown]
+    unexercised = [finding.promise for finding in open_ if not finding.unknown]
+    if len(unexercised) == len(findings):
         return "No promise was exercised"
-    return "All exercised promises hold"
+    but = [f"the outcome for {', '.join(undecided)} is unknown"] if undecided else []
+    but += [f"{', '.join(unexercised)} not exercised"] if unexercised else []
+    return f"No promise is violated, but {', and '.join(but)}" if but else "All promises hold"
 
 
 def html(title: str, remarks: Sequence[str], findings: Sequence[Finding], history: History) -> str:
     picture, *_ = timeline(history, findings)
+    ranked = sorted(findings, key=lambda finding: WORST_FIRST.index(finding.verdict))
     lines = [
         "<!doctype html><html lang=en><meta charset=utf-8>",
         "<meta name=viewport content='width=device-width'>",
-        f"<title>{escape(title)}</title><style>{COLORS}{PAGE_STYLE}{STYLE}</style>",
-        f"<h1 class={overall(findings).lower()}>{verdict(findings)}</h1>",
-        *(f"<p>{escape(remark)}</p>" for remark in remarks),
-        f"<h2>Promises</h2><div class=card>{_promises(findings)}</div>",
+        f"<title>{plain_html(title)}</title><style>{COLORS}{PAGE_STYLE}{STYLE}</style><main>",
+        f"<h1 class={ranked[0].verdict.lower() if ranked else ''}>{verdict(findings)}</h1>",
+        f"<h2>Promises</h2><div class=card>{_promises(ranked, history)}</div>",
+        f"<h2>Record</h2>{''.join(f'<p>{plain_html(remark)}</p>' for remark in remarks)}",
         f"<h2>Timeline</h2><p>{LEGEND}</p>{_chart(picture, 'timeline')}",
         f"<h2>Faults</h2><div class=card>{_faults(history)}</div>",
     ]
@@ -86,29 +95,34 @@ def _chart(picture: str, name: str) -> str:
     width = LEFT - 14  # px: before the first label of the axis
     style = f"width: {width}px; margin-right: -{width}px"
     names = f"<svg class=names style='{style}' aria-hidden=true><use href='#{name}' /></svg>"
-    return f"<div class='card chart'>{names}{picture.replace('<svg', f'<svg id={name}', 1)}</div>"
+    card = f"<div class='card chart' tabindex=0 role=group aria-label={name}>"
+    return f"{card}{names}{picture.replace('<svg', f'<svg id={name}', 1)}</div>"
 
 
-def _promises(findings: Sequence[Finding]) -> str:
+def _promises(findings: Sequence[Finding], history: History) -> str:
     columns = {
-        "": "",
+        "name": "inline",
+        "verdict": "inline",
         "promise": "sentence",
-        "verdict": "",
+        "measured": "sentence",
         "cases": "number",
         "unknown": "number",
-        "measured": "sentence",
     }
     rows = []
     for finding in findings:
         verdict = f"<span class='verdict {finding.verdict.lower()}'>{finding.verdict}</span>"
-        sentence = escape(meaning(finding.promise)) + _evidence(finding)
+        sentence = plain_html(meaning(finding.promise)) + _evidence(finding, history)
         numbers = str(finding.cases), str(finding.unknown)
-        rows.append((finding.promise, sentence, verdict, *numbers, escape(finding.summary)))
+        rows.append((finding.promise, verdict, sentence, plain_html(finding.summary), *numbers))
     return _table(columns, rows)
 
 
-def _evidence(finding: Finding) -> str:
-    lines = [f"{e.time:.2f} s: {escape(e.text)}" for e in finding.evidence[:SHOWN]]
+def _evidence(finding: Finding, history: History) -> str:
+    lines = [f"{e.time:.2f} s: {plain_html(e.words)}" for e in finding.evidence[:SHOWN]]
+    if finding.evidence:
+        lines[1:1] = [
+            f"· {plain_html(each)}" for each in account(history, finding.promise, finding.evidence[0])
+        ]
     if (more := len(finding.evidence) - SHOWN) > 0:
         lines.append(f"and {more} more")
     return "".join(f"<div class=evidence>{line}</div>" for line in lines)
@@ -124,11 +138,13 @@ def _faults(history: History) -> str:
         "hit": "sentence",
     }
     rows = []
-    for number, fault in enumerate(history.injected, start=1):
+    for number, fault in enumerate(history.faults, start=1):
         end = history.effect_end(fault)
         duration = f"{end - fault.begin:.1f} s" if end > fault.begin else "–"
-        kind, target = escape(fault.kind), escape(target_name(fault.target))
-        rows.append((str(number), f"{fault.begin:.1f} s", kind, target, duration, effect(history, fault)))
+        kind, target = plain_html(fault.kind), plain_html(target_name(fault.target))
+        rows.append(
+            (str(number), f"{fault.begin:.1f} s", kind, target, duration, plain_html(effect(history, fault)))
+        )
     return _table(columns, rows) if rows else "No faults."
 
 
@@ -145,9 +161,7 @@ def _table(columns: Mapping[str, str], rows: Iterable[Sequence[str]]) -> str:
 def effect(history: History, fault: InjectedFault) -> str:
     """Return which processes a fault hit and when they ended."""
     hit = [life for life in history.lives if _is_hit(life, fault)]
-    later = (
-        other.begin for other in history.injected if other.begin > fault.begin and other.pid == fault.pid
-    )
+    later = (other.begin for other in history.faults if other.begin > fault.begin and other.pid == fault.pid)
     until = min([fault.end + EFFECT, *(later if fault.pid else ())])
     ended = [life for life in hit if life.ended is not None and life.ended < until]
     if not hit:

@@ -1,4 +1,4 @@
-"""The limits of the promises but those that follow from the parameters of the arm. All in seconds."""
+"""The limits of the promises [s], except those that follow from the parameters of the arm."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 MEDIAN, SLOWEST = 1.0, 2.0  # L1: from SIGKILL until the output flows again
 GONE = 10.0  # L1: silence after any other fault
 GAP = 0.25  # L2: between two messages of a stream
+STREAM = 0.2  # L2: the usual time between two messages of a slowest stream: the rest is for delays
 HUNG = 5.0  # L4: from a hang until the output flows again
 
 

@@ -8,6 +8,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 
 from interfaces import topics
+from services import robot_state
+from tests.promises import claims
 from tests.promises.effects import (
     BEFORE,
     FLOWING,
@@ -18,37 +20,39 @@ from tests.promises.effects import (
     SAME,
     SETTLED,
     Effect,
-    Why,
+    Reason,
     disturbed_for,
-    effects,
     undisturbed,
 )
 from tests.promises.findings import Evidence, Finding, count, percentile
 from tests.promises.history import (
     ALL,
+    CONTROLLER,
     DEPENDENTS,
     KINEMATICS,
     OUTPUTS,
-    PROGRAMS,
+    ROBOT_STATE,
+    SENTINEL,
     SOURCES,
+    SWITCH,
     History,
     InjectedFault,
+    Sample,
     between,
 )
-from tests.promises.limits import GAP, GONE, HUNG, MEDIAN, SLOWEST
+from tests.promises.limits import GAP, GONE, HUNG, MEDIAN, SLOWEST, STREAM
 from tests.promises.positions import PublishedValues, may_lack_values
 
 SAMPLES = 3  # the least number of cases for a median
 
-STREAMS = tuple(program for program, topic in OUTPUTS.items() if topic.longest_gap <= GAP)
+STREAMS = frozenset(program for program, topic in OUTPUTS.items() if topic.longest_gap <= GAP)
 MOMENTARY = ("kill", "terminate", "raise")
 HANGS = ("stop", "hang")
 
 
-def output_resumes(history: History) -> Finding:
+def output_resumes(history: History, found: Sequence[Effect]) -> Finding:
     """L1: after SIGKILL of any service its output flows again: p50 ≤ 1.0 s, p99 ≤ 2.0 s."""
-    times: dict[str, list[float]] = {}
-    found = effects(history)
+    silences: dict[str, list[tuple[float, float]]] = {}  # how long, and when they began
     evidence, unknown = [], 0
     for fault in _kills(history):
         time = _recovery(history, fault)
@@ -59,17 +63,20 @@ def output_resumes(history: History) -> Finding:
         ):
             unknown += 1
         else:
-            times.setdefault(fault.target, []).append(time)
+            silences.setdefault(fault.target, []).append((time, fault.begin))
             if time > SLOWEST:
                 text = f"{fault.target} is silent {_duration(time)} after SIGKILL"
-                evidence.append(Evidence(fault.begin, text))
+                evidence.append(Evidence(fault.begin, text, _not_back(history, fault)))
+    times = {program: [time for time, _ in each] for program, each in silences.items()}
     for program, values in times.items():
         if len(values) >= SAMPLES and (median := percentile(values, 50)) > MEDIAN:
-            evidence.append(Evidence(0.0, f"{program}: the median silence after SIGKILL is {median:.2f} s"))
+            longest, begin = max(silences[program])
+            text = f"{program}: the median silence after its {len(values)} kills is {median:.2f} s"
+            evidence.append(Evidence(begin, text, f"after this kill, it was silent {_duration(longest)}"))
     evidence += _silent_for_good(history, found)
     every = [time for values in times.values() for time in values]
     measured = f"p50 {percentile(every, 50):.2f} s, p99 {percentile(every, 99):.2f} s" if every else ""
-    return Finding("L1", len(every), measured, evidence, unknown, times, max(every, default=math.nan))
+    return Finding("L1", len(every), measured, evidence, unknown, times, max(every, default=-math.inf))
 
 
 def _kills(history: History) -> Iterator[InjectedFault]:
@@ -78,36 +85,59 @@ def _kills(history: History) -> Iterator[InjectedFault]:
 
 def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evidence]:
     """Yield programs without output after a fault of any kind, unless another fault explains it."""
-    for fault in history.injected:
+    for fault in history.faults:
         begin, end = fault.end, fault.end + GONE
         if end > history.end:
             continue
-        for program in PROGRAMS if fault.target == ALL else (fault.target,):
-            if (
-                program not in PROGRAMS
-                or history.lacks(program)
-                or between(history.output(program), begin, end)
-            ):
+        for program in history.programs if fault.target == ALL else (fault.target,):
+            if history.lacks(program):
+                continue
+            output = history.output(program)
+            if between(output, begin, end):
+                continue
+            # A constant is published once: then the health shows that the program works.
+            is_constant = program in SOURCES and len({each.value for each in output}) == 1
+            is_rare = is_constant or _period(output) > FLOWING
+            if is_rare and between(history.health(program), begin, end):
+                continue
+            # Where nothing moves, there is nothing to publish.
+            if end - begin <= disturbed_for(found, program, begin, end, Reason.STILL) + FLOWING:
                 continue
             if _is_alone(found, fault, begin, end, program):
                 yield Evidence(end, f"{program} is silent for {GONE:g} s after {fault.kind}")
 
 
-def other_streams_flow(history: History) -> Finding:
-    """L2: meanwhile the other services' continuous streams (4 Hz or faster) show no gap over 250 ms."""
-    found = effects(history)
-    evidence, cases, unknown, longest = [], 0, 0, 0.0
+def other_streams_flow(history: History, found: Sequence[Effect]) -> Finding:
+    """L2: meanwhile the other services' continuous streams (5 Hz or faster) show no gap over 250 ms."""
+    cases, unknown, longest = 0, 0, 0.0
+    periods = {each: _expected_period(history, each) for each in history.programs if each in STREAMS}
+    # A user may choose slower ones.
+    streams = [program for program, period in periods.items() if round(period, 2) <= STREAM]
+    evidence = [
+        Evidence(
+            history.output(program)[0].sent,
+            f"{program} has a usual gap of {period:.2f} s instead of {periods[program]:.2f} s",
+        )
+        for program in streams
+        if GAP < (period := _period(history.output(program))) < math.inf
+    ]
     for fault in _kills(history):
         end = fault.begin + min(_recovery(history, fault) or SLOWEST, SLOWEST)
-        for program in STREAMS:
+        for program in streams:
             if not _flowed(history, program, fault.begin, GAP):
                 continue
-            if not undisturbed(found, program, fault.begin - BEFORE, end + GAP, Why.SILENT):
+            if program == KINEMATICS and not _leaves_a_source(history, fault):
+                continue
+            if not undisturbed(found, program, fault.begin - BEFORE, end + GAP, Reason.SILENT):
                 continue
             excused = 0
             for one, two in _intervals(history, program, fault.begin - GAP, end):
-                if two - one > GAP >= two - one - disturbed_for(found, program, one, two, *MISSED, Why.STILL):
-                    excused = 1  # the observer may have missed messages, or there was nothing to tell
+                if (
+                    two - one
+                    > GAP
+                    >= two - one - disturbed_for(found, program, one, two, *MISSED, Reason.STILL)
+                ):
+                    excused = 1  # the observer may have missed messages, or there was nothing to publish
                     continue
                 longest = max(longest, two - one)
                 if two - one > GAP:
@@ -119,6 +149,12 @@ def other_streams_flow(history: History) -> Finding:
     return Finding("L2", cases, measured, evidence, unknown, worst=longest)
 
 
+def _leaves_a_source(history: History, fault: InjectedFault) -> bool:
+    """Return whether a source that no fault hits publishes values: kinematics follows them."""
+    hit = (fault.target, *DEPENDENTS.get(fault.target, ()))
+    return any(_flowed(history, each, fault.begin, GAP) for each in SOURCES if each not in hit)
+
+
 def _intervals(history: History, program: str, begin: float, end: float) -> Iterator[tuple[float, float]]:
     """Yield the interval from each message sent between two times to the next one, or to the record's end."""
     output = history.output(program)
@@ -128,9 +164,35 @@ def _intervals(history: History, program: str, begin: float, end: float) -> Iter
     return itertools.pairwise([*(s.sent for s in output[first:last]), following])
 
 
-def right_after_restart(history: History) -> Finding:
+def _period(output: Sequence[Sample]) -> float:
+    """Return the usual time between two messages [s]; infinite if there are less than two.
+
+    A stream that is often interrupted has many longer ones.
+    """
+    times = [two.sent - one.sent for one, two in itertools.pairwise(output)]
+    return percentile(times, 25) if times else math.inf
+
+
+def _expected_period(history: History, program: str) -> float:
+    """Return the time between two messages of a stream [s]: by its parameters, or as it usually is.
+
+    Only the scenario knows that of the sources and the drive, and an old record may not show that of the
+    switch. Kinematics is as fast as each source.
+    """
+    rate = history.parameters.get(program, {}).get("rate")
+    if program == SWITCH and rate:
+        return 1.0 / float(rate)
+    if program == CONTROLLER:
+        return history.reaction.controller.repeat
+    if program == ROBOT_STATE:
+        return 1.0 / float(rate or robot_state.Parameters.rate)
+    if program == KINEMATICS:
+        return min(_period(history.output(source)) for source in SOURCES)
+    return _period(history.output(program))
+
+
+def right_after_restart(history: History, found: Sequence[Effect]) -> Finding:
     """L3: values that changed while a service was dead are right after its return."""
-    found = effects(history)
     published = PublishedValues(history)
     evidence, cases, unknown = [], 0, 0
     for fault in history.faults:
@@ -140,7 +202,7 @@ def right_after_restart(history: History) -> Finding:
         if time is None:
             continue
         begin = fault.begin + time + SETTLED
-        if not undisturbed(found, KINEMATICS, begin, begin + 1.0, Why.SILENT, but=fault):
+        if not undisturbed(found, KINEMATICS, begin, begin + 1.0, Reason.SILENT, but=fault):
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
         right = bool(positions) and published.explain(positions[-1], within=SETTLED)
@@ -155,20 +217,19 @@ def right_after_restart(history: History) -> Finding:
     return Finding("L3", cases, measured, evidence, unknown)
 
 
-def hung_is_replaced(history: History) -> Finding:
+def hung_is_replaced(history: History, found: Sequence[Effect]) -> Finding:
     """L4: a hung service is replaced within 5 s."""
     times: dict[str, list[float]] = {}
-    found = effects(history)
     evidence, unknown = [], 0
     for fault in history.faults:
         lasted = fault.end - fault.begin
-        if fault.kind not in HANGS or fault.target not in PROGRAMS or lasted < HUNG:
+        if fault.kind not in HANGS or fault.target not in history.programs or lasted < HUNG:
             continue
         time = _recovery(history, fault)
         until = fault.begin + (0.0 if time is None else min(time, HUNG))
         if (
             time is None
-            or not undisturbed(found, fault.target, fault.begin - BEFORE, until, Why.UNWATCHED, but=fault)
+            or not undisturbed(found, fault.target, fault.begin - BEFORE, until, Reason.UNWATCHED, but=fault)
             or not _is_alone(found, fault, fault.begin, until)
             or _paused(found, fault, time, HUNG)
         ):
@@ -176,10 +237,34 @@ def hung_is_replaced(history: History) -> Finding:
             continue
         times.setdefault(fault.target, []).append(time)
         if time > HUNG:
-            evidence.append(Evidence(fault.begin, f"{fault.target} hangs and is silent {_duration(time)}"))
+            text = f"{fault.target} hangs and is silent {_duration(time)}"
+            cause = _not_replaced(history, fault)
+            if not cause:
+                text, cause = f"{SENTINEL} lived, but did not replace {fault.target}", text
+            evidence.append(Evidence(fault.begin, text, cause))
+    evidence += claims.ends_have_causes(history, found)
     every = [time for values in times.values() for time in values]
     measured = f"replaced within {max(every):.2f} s, allowed {HUNG:g} s" if every else ""
-    return Finding("L4", len(every), measured, evidence, unknown, times, max(every, default=math.nan))
+    return Finding("L4", len(every), measured, evidence, unknown, times, max(every, default=-math.inf))
+
+
+def _not_back(history: History, fault: InjectedFault) -> str:
+    """Return why a killed program may be silent: who had to act, and what is known of that."""
+    began = [
+        life.began for life in history.lives if life.program == fault.target and life.began > fault.begin
+    ]
+    if began:
+        return f"its successor started after {min(began) - fault.begin:.2f} s"
+    return "supervisord did not start it again"
+
+
+def _not_replaced(history: History, fault: InjectedFault) -> str:
+    """Return why a program may hang for long; empty if the sentinel had to act, and lived."""
+    ended = history.effect_end(fault)
+    if ended < fault.end and ended - fault.begin <= HUNG:
+        return f"it was killed after {ended - fault.begin:.2f} s, but its successor was silent"
+    is_heard = between(history.output(SENTINEL), fault.begin, fault.begin + HUNG)
+    return "" if is_heard else f"{SENTINEL} was silent, too"
 
 
 def _recovery(history: History, fault: InjectedFault) -> float | None:
@@ -229,8 +314,8 @@ def _is_alone(
     # If all were hit, those that it follows had to start as well.
     followed = [each for each, dependents in DEPENDENTS.items() if program in dependents]
     starting = (program, *followed) if fault.target == ALL else (program,)
-    return undisturbed(found, program, begin, end, Why.SILENT, but=fault) and all(
-        undisturbed(found, each, time, time, Why.WAITING) for each in starting for time in (begin, end)
+    return undisturbed(found, program, begin, end, Reason.SILENT, but=fault) and all(
+        undisturbed(found, each, time, time, Reason.WAITING) for each in starting for time in (begin, end)
     )
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import reprlib
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
@@ -16,22 +18,23 @@ from std_msgs.msg import String
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import METADATA
 from interfaces import topics
-from interfaces.service.health import reported_parameters
-from tests.promises.effects import Effect, Why, effects, undisturbed
+from interfaces.service.health import reported_movement, reported_parameters
+from tests.promises import lateness
 from tests.promises.history import (
-    ALL,
-    NO_TARGET,
+    CONDITIONS,
+    HOST,
     OVERLOAD,
+    SAID,
+    Condition,
     History,
     InjectedFault,
     Life,
     Sample,
-    merged,
 )
 from tests.promises.marks import is_babble
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
-LATE = 0.1  # s; a message that takes longer shows an overload
+_TEXTS = ("namespace", "program", "kind", "target", "detail")  # in an event; all else are numbers
 EARLY = 0.001  # s by which a message may seem to be sent after its reception: clocks are read one by one
 
 
@@ -45,6 +48,9 @@ def _opened(path: Path) -> Iterator[McapFile]:
         raise DeploymentError(f"Record {path}: {error.strerror}") from None
     except UnreadableError as error:
         raise DeploymentError(str(error)) from None
+    except (LookupError, RecursionError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise DeploymentError(f"Record {path}: it is none of make chaos: {reason}") from None
 
 
 def namespaces(path: Path) -> list[str]:
@@ -67,8 +73,9 @@ def load(path: Path, namespace: str = "/") -> History:
     streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
     lives: dict[tuple[int, float], Life] = {}
     faults: list[InjectedFault] = []
+    conditions: list[Condition] = []
     with _opened(path) as file:
-        origin = next(int(each.metadata["origin"]) for each in file.metadata if each.name == METADATA)
+        (origin,) = (int(each.metadata["origin"]) for each in file.metadata if each.name == METADATA)
         end = (file.end - origin) / 1e9
         for channel, message in file.messages([*names, PROCESSES, FAULTS]):
             received, sent = ((t - origin) / 1e9 for t in (message.log_time, message.publish_time))
@@ -80,6 +87,8 @@ def load(path: Path, namespace: str = "/") -> History:
                 event = read_event(channel.topic, message.data, namespace)
                 if isinstance(event, InjectedFault):
                     faults.append(event)
+                elif isinstance(event, Condition):
+                    conditions.append(event)
                 elif event is not None:
                     lives[event.pid, event.began] = event
     offsets = {0.0, *(fault.ahead for fault in faults)}
@@ -90,32 +99,10 @@ def load(path: Path, namespace: str = "/") -> History:
         streams,
         sorted(lives.values(), key=lambda life: life.began),
         sorted(faults, key=lambda f: f.begin),
+        conditions,
     )
-    overloads = [InjectedFault(OVERLOAD, NO_TARGET, *each) for each in late_receptions(history)]
-    return replace(history, faults=sorted([*history.faults, *overloads], key=lambda f: f.begin))
-
-
-def late_receptions(history: History) -> list[tuple[float, float]]:
-    """Return the times in which a message waited for the observer, or for its sender: an overload.
-
-    Messages that a fault of the network may have delayed do not count, nor those of a publisher that the
-    observer may not have discovered yet.
-    """
-    found = [each for each in effects(history) if each.why in (Why.LATE_LINE, Why.LATE_START)]
-    return merged(
-        (sample.sent, sample.received)
-        for topic in topics.CONTRACT
-        for sample in history.stream(topic)
-        if sample.received - sample.sent > LATE and _shows_overload(found, topic, sample)
-    )
-
-
-def _shows_overload(found: Iterable[Effect], topic: topics.Topic, sample: Sample) -> bool:
-    """Return whether nothing else explains that a message was late."""
-    publishers = topic.publishers if topic is not topics.DIAGNOSTICS else sample.value[:1]
-    return undisturbed(found, ALL, sample.sent, sample.received, Why.LATE_LINE) and all(
-        undisturbed(found, each, sample.sent, sample.sent, Why.LATE_START) for each in publishers
-    )
+    overloads = [Condition(OVERLOAD, *each) for each in lateness.overloads(history)]
+    return replace(history, conditions=sorted([*conditions, *overloads], key=lambda each: each.begin))
 
 
 def clock_offsets(faults: Iterable[bytes]) -> set[float]:
@@ -137,17 +124,27 @@ def time_sent(received: float, stamp: float, offsets: Collection[float], second:
     return received - min(latencies, key=lambda latency: (latency < -EARLY * second, abs(latency)))
 
 
-def read_event(topic: str, data: bytes, namespace: str) -> Life | InjectedFault | None:
+def read_event(topic: str, data: bytes, namespace: str) -> Life | InjectedFault | Condition | None:
     """Return an event of :data:`PROCESSES` or :data:`FAULTS`; ``None`` if it concerns another arm."""
     event = _event(data)
     if event.pop("namespace", namespace) != namespace:
         return None
     event.pop("detail", None)  # of an older record; always empty
-    return InjectedFault(**event) if topic == FAULTS else Life(**event)
+    if topic == PROCESSES:
+        return Life(**event)
+    if event["kind"] in CONDITIONS:  # records of before have them with the fields of a fault
+        return Condition(event["kind"], event["begin"], event["end"])
+    return InjectedFault(**event)
 
 
 def _event(data: bytes) -> dict[str, Any]:
-    event: dict[str, Any] = json.loads(deserialize_message(data, String).data)
+    event = json.loads(deserialize_message(data, String).data)
+    if not isinstance(event, dict):
+        raise ValueError("an event is no JSON object")
+    for name, value in event.items():
+        is_right = isinstance(value, str if name in _TEXTS else (float, int))
+        if not is_right and (name, value) != ("ended", None):
+            raise ValueError(f"{name} is {reprlib.repr(value)}")
     return event
 
 
@@ -163,6 +160,8 @@ def values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
         return [(message.point.x, message.point.y)]
     if topic is topics.OPERATOR_PRESENCE:
         return [message.stamp.sec + message.stamp.nanosec / 1e9]
+    if topic is topics.DRIVEN_TIME:
+        return [topic.value(message)[1:3]]
     if topic is not topics.DIAGNOSTICS:
         return [getattr(message, "data", None)]
     found = []
@@ -171,6 +170,12 @@ def values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
         reporter, _, subject = status.name.removeprefix(prefix).partition(": ")
         if status.name.startswith(prefix) and "/" not in reporter and subject in ("", reporter):
             with suppress(ValueError):  # a foreign node may use the key for something else
-                given = reported_parameters(status).items()
-                found += [(reporter, int(pair.value), *given) for pair in status.values if pair.key == "pid"]
+                given = reported_parameters(status) | reported_movement(status)
+                if status.hardware_id:
+                    given[HOST] = status.hardware_id
+                if status.level != DiagnosticStatus.OK:
+                    given[SAID] = status.message
+                found += [
+                    (reporter, int(pair.value), *given.items()) for pair in status.values if pair.key == "pid"
+                ]
     return found

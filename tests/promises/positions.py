@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from interfaces import topics
 from interfaces.limits import LARGEST
-from tests.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, Effect, Why, undisturbed
+from tests.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, Effect, Reason, undisturbed
 from tests.promises.history import SOURCES, History, Sample, last_sent
 
 ROUNDING = 1e-8  # m
@@ -52,9 +52,9 @@ def may_lack_values(history: History, found: Sequence[Effect], time: float) -> b
     for source in SOURCES:
         newest = last_sent(history.output(source), time)
         seen = newest.sent if newest else -math.inf
-        missed = not undisturbed(found, source, time - DISCOVERY, time, *MISSED, Why.UNDISCOVERED)
+        missed = not undisturbed(found, source, time - DISCOVERY, time, *MISSED, Reason.UNDISCOVERED)
         # What a source sends while it is killed may reach kinematics only.
-        if missed or not undisturbed(found, source, seen, time, Why.CUT_OFF):
+        if missed or not undisturbed(found, source, seen, time, Reason.CUT_OFF):
             return True
     return False
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
 from interfaces import topics
-from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
+from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
+from tests.promises import claims
 from tests.promises.effects import (
     BAD_TRANSPORT,
     BEFORE,
@@ -19,20 +20,20 @@ from tests.promises.effects import (
     SAME,
     TRANSPORT,
     Effect,
-    Why,
+    Reason,
     disturbing,
-    effects,
     undisturbed,
 )
 from tests.promises.findings import Evidence, Finding, count, how_often
 from tests.promises.history import (
     ALL,
     CONTROLLER,
+    HOST,
     SILENCE,
     SWITCH,
     WATCHDOG,
+    Condition,
     History,
-    InjectedFault,
     Life,
     Sample,
     between,
@@ -43,19 +44,20 @@ from tests.promises.history import (
 )
 from tests.promises.positions import PublishedValues, may_lack_values
 
+LETTING_GO = 1.0  # s from the operator's release until no heartbeat may come
 FAIL_SAFES = {
-    WATCHDOG: (Why.SILENT, Why.SUSPENDED, Why.DEAF, Why.DELAYED, *MISSED),
-    CONTROLLER: (Why.SILENT, Why.SUSPENDED, *MISSED),
+    WATCHDOG: (Reason.SILENT, Reason.SUSPENDED, Reason.DEAF, Reason.DELAYED, *MISSED),
+    CONTROLLER: (Reason.SILENT, Reason.SUSPENDED, *MISSED),
 }
 """The programs of F1 and F2 (deploy/SAFETY.md), and the effects that may keep them from acting in time."""
 
 
-def engines_off_in_time(history: History) -> Finding:
+def engines_off_in_time(history: History, found: Sequence[Effect]) -> Finding:
     """S1: engines are off in time after the operator's last sign of life."""
     alive = [s.sent for s in history.signs_of_life()]
     evidence, longest, longest_undisturbed, cases, unknown = [], 0.0, 0.0, 0, 0
-    given, on, found = history.reaction, list(running(history)), effects(history)
-    overloads = merged((each.begin, each.end) for each in found if each.why == Why.OVERLOADED)
+    given, on = history.reaction, list(running(history))
+    overloads = merged((each.begin, each.end) for each in found if each.why == Reason.OVERLOADED)
     for begin, end in gaps(alive, -math.inf, history.end):
         late = _overlapping_part(on, begin, end)
         if not late:
@@ -82,17 +84,19 @@ def engines_off_in_time(history: History) -> Finding:
         cases += late[-1][1] < end and end - begin > given.controller.max_presence_age
         if lasted > allowed:
             text = f"engines still on {lasted:.2f} s after the operator's last sign of life"
-            evidence.append(Evidence(since + allowed, text))
+            due = since + allowed
+            evidence.append(Evidence(due, text, _kept_on(history, since, due)))
+    evidence += _held_without_a_hand(history, found)
+    evidence += claims.last_strike_stops(history, found)
     measured = f"off within {longest:.2f} s, allowed {given.off_within:g} s"
     if longest_undisturbed:
         measured += f"; undisturbed {longest_undisturbed:.2f} s, allowed {given.off_undisturbed:g} s"
     return Finding("S1", cases, measured, evidence, unknown, worst=longest)
 
 
-def engines_stay_on(history: History) -> Finding:
+def engines_stay_on(history: History, found: Sequence[Effect]) -> Finding:
     """S2: while the operator is alive, killing any service but the controller keeps the engines on."""
     evidence, permitted, kills, unknown = [], 0, 0, 0
-    found = effects(history)
     for on, off in _changes(history, ON, OFF):
         if _was_away(found, on, off) or _commanded(history, found, off) or _abandoned(history, found, off):
             permitted += 1
@@ -111,11 +115,11 @@ def engines_stay_on(history: History) -> Finding:
     return Finding("S2", kills, measured, evidence, unknown)
 
 
-def turned_on_with_operator(history: History) -> Finding:
+def turned_on_with_operator(history: History, found: Sequence[Effect]) -> Finding:
     """S3: engines turn on only by a `turn_on` with the operator present."""
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_ON]
     heartbeats = history.signs_of_life()
-    found, age = effects(history), history.reaction.controller.max_presence_age
+    age = history.reaction.controller.max_presence_age
     evidence, cases, unknown, oldest = [], 0, 0, 0.0
     before = -math.inf
     for stopped, on in _starts(history):
@@ -127,19 +131,22 @@ def turned_on_with_operator(history: History) -> Finding:
             cases += 1
             oldest = max(oldest, on.sent - seen[-1].sent)
         elif _was_present(history, on.sent) and not undisturbed(
-            found, SWITCH, on.sent, on.sent, Why.UNDISCOVERED
+            found, SWITCH, on.sent, on.sent, Reason.UNDISCOVERED
         ):
             unknown += 1
+        elif not undisturbed(found, CONTROLLER, max(stopped, on.sent - age), on.sent, Reason.OPPOSED):
+            unknown += 1  # it was on all the time
         elif not undisturbed(found, ALL, max(stopped, on.sent - age), on.sent, *MISSED):
             unknown += 1  # the observer may have missed the command, or the states that kept them on
         else:
             missing = "a turn_on" if not command else "a sign of life"
             evidence.append(Evidence(on.sent, f"engines turned on without {missing} in the last {age:g} s"))
+    evidence += claims.present_operator_is_obeyed(history, found)
     measured = f"turned on {how_often(cases)}, operator seen at most {oldest:.2f} s before"
     return Finding("S3", cases, measured, evidence, unknown)
 
 
-def valid_speeds_and_positions(history: History) -> Finding:
+def valid_speeds_and_positions(history: History, found: Sequence[Effect]) -> Finding:
     """S4: a speed is finite and ≥ 0; a position equals the kinematics of published values."""
     speeds = history.stream(topics.EFFECTOR_SPEED)
     evidence = [
@@ -147,7 +154,6 @@ def valid_speeds_and_positions(history: History) -> Finding:
     ]
     published = PublishedValues(history)
     positions = history.stream(topics.EFFECTOR_POSITION)
-    found = effects(history)
     unknown = 0
     for position in positions:
         if published.explain(position, within=LONGEST_PAUSE):
@@ -160,9 +166,8 @@ def valid_speeds_and_positions(history: History) -> Finding:
     return Finding("S4", len(positions) + len(speeds) - unknown, measured, evidence, unknown)
 
 
-def single_instances(history: History) -> Finding:
-    """S5: never two live instances of one service."""
-    found = effects(history)
+def single_instances(history: History, found: Sequence[Effect]) -> Finding:
+    """S5: never two live instances of one service on a host."""
     evidence, unknown = [], 0
     for second, life in _reports_beside_another(history):
         if life.ended is not None and not undisturbed(found, ALL, second.sent, life.ended, *MISSED):
@@ -180,7 +185,7 @@ def _allowed(history: History, found: Sequence[Effect], begin: float, end: float
     """Return within which time [s] the engines must be off, by the fail-safes that a fault hits."""
     hits = [
         any(
-            not isinstance(each.cause, InjectedFault) or each.cause.kind != SILENCE
+            not isinstance(each.cause, Condition) or each.cause.kind != SILENCE
             for each in disturbing(found, program, begin, end, *why)
         )
         for program, why in FAIL_SAFES.items()
@@ -189,12 +194,39 @@ def _allowed(history: History, found: Sequence[Effect], begin: float, end: float
     return (given.off_undisturbed, given.off_after_one_death, given.off_within)[sum(hits)]
 
 
+def _held_without_a_hand(history: History, found: Sequence[Effect]) -> Iterator[Evidence]:
+    """Yield each time in which the switch sends heartbeats although the operator has let go of it."""
+    signs = history.signs_of_life()
+    for silence in history.conditions:
+        if silence.kind != SILENCE:
+            continue
+        for beat in between(signs, silence.begin + LETTING_GO, silence.end - SAME):
+            # A switch that was away may send what was due, and a stranger may send heartbeats.
+            away = disturbing(found, SWITCH, beat.sent - SAME, beat.sent, Reason.SILENT, Reason.OVERLOADED)
+            if all(each.cause is silence for each in away):
+                since = beat.sent - silence.begin
+                text = f"a heartbeat is sent {since:.2f} s after the operator has let go of the switch"
+                yield Evidence(beat.sent, text)
+                break
+
+
 def _overlapping_part(
     intervals: Sequence[tuple[float, float]], begin: float, end: float
 ) -> Sequence[tuple[float, float]]:
     """Return the intervals, of those in order, that overlap the one from ``begin`` to ``end``."""
     first = bisect_right(intervals, begin, key=itemgetter(1))
     return intervals[first : bisect_left(intervals, end, key=itemgetter(0))]
+
+
+def _kept_on(history: History, since: float, due: float) -> str:
+    """Return which fail-safes did not act, of a silence that began at ``since``."""
+    commands = between(history.stream(topics.ENGINES), since, due)
+    commanded = any(command.value == TURN_OFF for command in commands)
+    watchdog = f"{WATCHDOG} sent {'' if commanded else 'no '}{TURN_OFF}"
+    states = between(history.stream(topics.ENGINES_STATE), due - DRIVE_TIMEOUT, history.end)
+    last = next((state for state in states if state.value == ON), None)
+    controller = f"{CONTROLLER} still sent {ON}" if last else "the drive kept the last command"
+    return f"{watchdog}, {controller}"
 
 
 def _between(
@@ -227,9 +259,9 @@ def _changes(history: History, before: str, after: str) -> Iterator[tuple[Sample
 
 def _was_away(found: Sequence[Effect], on: Sample, off: Sample) -> bool:
     """Return whether the controller was replaced or suspended between its `on` and its `off`."""
-    if not undisturbed(found, CONTROLLER, on.sent, off.sent, Why.REPLACED):
+    if not undisturbed(found, CONTROLLER, on.sent, off.sent, Reason.REPLACED, Reason.OPPOSED):
         return True
-    paused = not undisturbed(found, CONTROLLER, on.sent, off.sent, Why.SUSPENDED, *MISSED)
+    paused = not undisturbed(found, CONTROLLER, on.sent, off.sent, Reason.SUSPENDED, *MISSED)
     return paused and off.sent - on.sent > DRIVE_TIMEOUT
 
 
@@ -247,22 +279,16 @@ def _commanded(history: History, found: Sequence[Effect], off: Sample) -> bool:
     """
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
     just_before = between(commands, off.sent - _transport(found, off.sent), off.sent + SAME)
-    if not all(_is_of_watchdog(history, command) for command in just_before):
+    if not all(claims.is_of_watchdog(history, command) for command in just_before):
         return True
     # Counted at the command: a successor of the watchdog begins to count again.
     strikes = (_strikes(history, found, command.sent) for command in just_before)
     return any(number >= history.reaction.watchdog.strikes for number in strikes)
 
 
-def _is_of_watchdog(history: History, command: Sample) -> bool:
-    """Return whether the watchdog commanded `turn_off`: it publishes its conclusion before that."""
-    conclusion = last_sent(history.stream(topics.OPERATOR_ACTIVITY), command.sent)
-    return conclusion is None or conclusion.value == INCAPACITATED
-
-
 def _transport(found: Sequence[Effect], time: float) -> float:
     """Return how long a message may have taken that arrived then [s]."""
-    quick = undisturbed(found, ALL, time - BAD_TRANSPORT, time, Why.DELAYED)
+    quick = undisturbed(found, ALL, time - BAD_TRANSPORT, time, Reason.DELAYED)
     return TRANSPORT if quick else BAD_TRANSPORT
 
 
@@ -271,7 +297,7 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     commands = (
         s.sent
         for s in history.stream(topics.ENGINES)
-        if s.value == TURN_OFF and s.sent < time - 1.0 and _is_of_watchdog(history, s)
+        if s.value == TURN_OFF and s.sent < time - 1.0 and claims.is_of_watchdog(history, s)
     )
     starts = (life.began for life in history.lives_of(WATCHDOG) if life.began < time)
     since = max([*commands, *starts], default=0.0)
@@ -281,7 +307,7 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     # A suspended watchdog receives no heartbeat either, nor the last one before; S2 does not cover that.
     deaf = [
         (max(effect.begin - given.reading, begin), min(effect.end, time))
-        for effect in disturbing(found, WATCHDOG, begin, time, Why.DEAF)
+        for effect in disturbing(found, WATCHDOG, begin, time, Reason.DEAF)
     ]
     # Intervals that only touch have a heartbeat in between.
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
@@ -291,14 +317,18 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
 def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
     """Return whether the operator or a suspended watchdog left the controller without a presence."""
     given = history.reaction
-    # A presence is as old as its stamp.
-    begin = off.sent - given.controller.presence_timeout + given.watchdog.sampling + TRANSPORT
-    deaf = list(disturbing(found, WATCHDOG, begin, off.sent, Why.DEAF))
+    # A presence is as old as its heartbeat, and the watchdog reads that one a little later.
+    begin = off.sent - given.controller.presence_timeout + given.watchdog.reading + TRANSPORT
+    deaf = list(disturbing(found, WATCHDOG, begin, off.sent, Reason.DEAF))
+    signs = history.signs_of_life()
     for presence in between(history.stream(topics.OPERATOR_PRESENCE), begin, off.sent - TRANSPORT):
+        seen = last_sent(signs, presence.sent)
         # A presence sent right after resuming may stem from an older heartbeat.
-        if not any(each.begin < presence.sent <= each.end + TRANSPORT for each in deaf):
+        is_deaf = any(each.begin < presence.sent <= each.end + TRANSPORT for each in deaf)
+        arrives = undisturbed(found, CONTROLLER, presence.sent, presence.sent, Reason.DEAF)
+        if seen and seen.sent > begin and arrives and not is_deaf:
             return False
-    heartbeats = [s.sent for s in history.signs_of_life()]
+    heartbeats = [s.sent for s in signs]
     absence = given.controller.max_presence_age
     silent = any(two - one > absence for one, two in gaps(heartbeats, begin, off.sent))
     return silent or bool(deaf)
@@ -320,10 +350,10 @@ def _reports_beside_another(history: History) -> Iterator[tuple[Sample, Life]]:
     soon it ends depends on the machine.
     """
     lives = {(life.program, life.pid): life for life in history.lives}
-    instances: dict[str, set[int]] = {}
+    instances: dict[tuple[str, str], set[int]] = {}
     for sample in history.stream(topics.DIAGNOSTICS):
-        name, pid, *_ = sample.value
-        known = instances.setdefault(name, set())
+        name, pid, *given = sample.value
+        known = instances.setdefault((name, dict(given).get(HOST, "")), set())
         if pid in known:
             continue
         for life in filter(None, (lives.get((name, other)) for other in sorted(known))):

@@ -10,18 +10,20 @@ import pytest
 from interfaces import topics
 from interfaces.robot_model import forward_kinematics
 from interfaces.topics import OFF, ON, TURN_OFF
+from tests.promises import promises
+from tests.promises.effects import effects
 from tests.promises.findings import HOLDS, UNKNOWN, VIOLATED, percentile
 from tests.promises.history import (
     ALL,
     DEPENDENTS,
     NEEDED_AT_START,
     NO_TARGET,
-    OPERATOR,
-    PROGRAMS,
+    Condition,
     History,
     InjectedFault,
     Life,
     Sample,
+    programs_of_manifest,
 )
 from tests.promises.promises import CHECKERS, meaning
 from tests.promises.text_report import text
@@ -39,7 +41,7 @@ def asleep(history: History, begin: float, off: float) -> History:
     history = silent(history, "operator_presence", begin, END)
     history = with_value(history, "engines/state", OFF, off)
     history = added(history, "engines", (off, TURN_OFF))
-    return faulty(history, InjectedFault("silence", OPERATOR, begin, END))
+    return faulty(history, Condition("silence", begin, END))
 
 
 @pytest.mark.parametrize("promise", CHECKERS)
@@ -123,6 +125,14 @@ def test_s2_duplicate_that_ends_itself_is_not_a_successor() -> None:
     history = with_value(killed(good(), "velocity", 30.0, 0.6), "engines/state", OFF, 30.5)
     controller = Life("engine_controller", 999, 30.3, 30.7)  # the other one turned them off
     assert verdict("S2", replace(history, lives=[*history.lives, controller])) == VIOLATED
+
+
+def test_s2_permits_a_stop_a_little_early_if_the_last_presence_came_too_late() -> None:
+    history = silent(good(), "operator_heartbeat", 20.01, END)
+    history = silent(history, "operator_presence", 20.01, END)
+    history = with_value(history, "engines/state", OFF, 29.6)
+    assert verdict("S2", history) == VIOLATED
+    assert verdict("S2", faulty(history, InjectedFault("hold", "operator_presence", 19.8, 22.0))) == UNKNOWN
 
 
 # S3
@@ -209,7 +219,7 @@ def test_s4_is_unknown_until_a_killed_source_sends_again(at: float, expected: st
 
 def test_s4_is_unknown_on_a_lossy_network() -> None:
     history = added(good(), "effector/position", (30.0, (1.0, 9.0)))
-    finding = CHECKERS["S4"](faulty(history, InjectedFault("loss", NO_TARGET, 0.0, END)))
+    finding = CHECKERS["S4"](faulty(history, Condition("loss", 0.0, END)))
     assert (finding.verdict, finding.unknown) == (HOLDS, 1)
 
 
@@ -250,7 +260,7 @@ def test_l1_detects_silence_for_good_after_any_fault() -> None:
     finding = CHECKERS["L1"](faulty(history, InjectedFault("kill_supervisor", ALL, 20.0, 21.0)))
     # Programs that wait for silent sources are silent, too.
     waiting = {*NEEDED_AT_START, *(each for program in NEEDED_AT_START for each in DEPENDENTS[program])}
-    assert len(finding.evidence) == len(set(PROGRAMS) - waiting)
+    assert len(finding.evidence) == len(set(programs_of_manifest()) - waiting)
 
 
 def test_l1_silence_of_all_that_waits_for_a_dead_source_is_explained() -> None:
@@ -309,6 +319,28 @@ def test_l2_speed_may_pause_with_positions() -> None:
     assert verdict("L2", history) == HOLDS
 
 
+@pytest.mark.parametrize(
+    ("killed", "moving", "judged"),
+    [("config_l2", {"l2"}, False), ("drive", {"theta1", "theta2"}, False), ("config_l2", {"l2", "l1"}, True)],
+)
+def test_l2_kinematics_need_not_go_on_without_a_source(killed: str, moving: set[str], judged: bool) -> None:
+    history = faulty(good(), InjectedFault("kill", killed, 20.0, 20.0))
+    for topic in topics.CONFIGURATION.keys() - moving:
+        history = silent(history, topic, 0.2, END)
+    history = silent(history, "effector/position", 20.0, 20.3)  # longer than each source is silent
+    found = [each for each in CHECKERS["L2"](history).evidence if "kinematics" in each.text]
+    assert bool(found) is judged
+
+
+def test_l2_kinematics_may_pause_with_its_sources() -> None:
+    history = killed(good(), "drive", 20.0, 0.6)
+    for topic in (*topics.CONFIGURATION, "effector/position", "effector/speed"):
+        history = silent(history, topic, 20.0, 20.5)
+    assert not [each for each in CHECKERS["L2"](history).evidence if "kinematics" in each.text]
+    moved = added(history, "l1", (20.2, 2.0), (20.4, 2.0))
+    assert [each for each in CHECKERS["L2"](moved).evidence if "kinematics" in each.text]
+
+
 # L3
 
 
@@ -323,7 +355,7 @@ def test_l3_is_unknown_if_a_value_may_have_been_missed() -> None:
 
     history = killed(good(), "kinematics", 20.0, 0.6)
     assert verdict("L3", of_another_value(history)) == VIOLATED
-    finding = CHECKERS["L3"](faulty(of_another_value(history), InjectedFault("loss", NO_TARGET, 0.0, END)))
+    finding = CHECKERS["L3"](faulty(of_another_value(history), Condition("loss", 0.0, END)))
     assert (len(finding.evidence), finding.unknown) == (0, 1)
     finding = CHECKERS["L3"](of_another_value(killed(history, "config_l1", 21.5, 0.6)))
     assert (len(finding.evidence), finding.unknown) == (0, 1)
@@ -370,3 +402,128 @@ def test_percentiles_are_nearest_ranks() -> None:
     assert (percentile(values, 50), percentile(values, 99)) == (50.0, 99.0)
     assert math.isnan(percentile([], 50))
     assert value_at("l1", 0.0) == 2.0
+
+
+def test_l1_constant_that_is_told_once_is_not_silent_for_good() -> None:
+    first = [sample._replace(value=2.0) for sample in good().stream(topics.L1)[:1]]
+    slow = InjectedFault("slow", "config_l1", 20.0, 21.0, 100)
+    history = replace(good(), streams={**good().streams, "l1": first}, faults=[slow])
+    assert not CHECKERS["L1"](history).evidence
+    others = [each for each in history.stream(topics.DIAGNOSTICS) if each.value[0] != "config_l1"]
+    mute = replace(history, streams={**history.streams, "/diagnostics": others})
+    assert [each.text for each in CHECKERS["L1"](mute).evidence] == [
+        "config_l1 is silent for 10 s after slow"
+    ]
+
+
+def test_l1_constant_of_successors_that_come_soon_is_not_silent_for_good() -> None:
+    told = [Sample(at, at, 2.0) for at in (1.0, 1.5, 2.0)]
+    slow = InjectedFault("slow", "config_l1", 20.0, 21.0, 100)
+    history = replace(good(), streams={**good().streams, "l1": told}, faults=[slow])
+    assert not CHECKERS["L1"](history).evidence
+
+
+LATE = 0.002  # s
+
+
+def slowed(history: History, topic: str, period: float) -> History:
+    """Return the history in which a stream has another period, with a kill now and then."""
+    kills = [InjectedFault("kill", "velocity", at, at) for at in (10.0, 20.1, 30.2, 40.3)]
+    times = [step * period + (step % 3 == 0) * LATE for step in range(1, int(END / period))]
+    values = history.streams[topic]
+    samples = [Sample(t, t + 0.001, values[min(len(values) - 1, int(t))].value) for t in times]
+    return replace(history, streams=history.streams | {topic: samples}, faults=kills)
+
+
+def reporting(history: History, program: str, **parameters: float) -> History:
+    """Return the history in which a service reports parameters."""
+    return change(
+        history,
+        "/diagnostics",
+        lambda s: s._replace(value=(*s.value, *parameters.items())) if s.value[0] == program else s,
+    )
+
+
+@pytest.mark.parametrize(
+    ("topic", "program", "parameters"),
+    [
+        ("operator_heartbeat", "dead_mans_switch", {"rate": 4.0}),
+        ("operator_heartbeat", "dead_mans_switch", {"rate": 1.0}),
+        ("theta1", "config_theta1", {}),  # by the scenario
+    ],
+)
+def test_l2_does_not_judge_a_stream_that_is_meant_to_be_slow(
+    topic: str, program: str, parameters: dict[str, float]
+) -> None:
+    for period in (0.25, 0.3):
+        history = reporting(slowed(good(), topic, period), program, **parameters)
+        assert not [each for each in CHECKERS["L2"](history).evidence if program in each.text]
+
+
+@pytest.mark.parametrize(
+    ("topic", "program", "parameters"),
+    [
+        ("operator_heartbeat", "dead_mans_switch", {"rate": 20.0}),
+        ("operator_heartbeat", "dead_mans_switch", {"rate": 5.0}),
+        ("engines/state", "engine_controller", {"repeat": 0.2}),
+        ("joint_states", "robot_state", {"rate": 5.0}),
+        ("joint_states", "robot_state", {}),
+        ("effector/position", "kinematics", {}),
+    ],
+)
+def test_l2_finds_a_stream_that_is_slower_than_its_parameters_say(
+    topic: str, program: str, parameters: dict[str, float]
+) -> None:
+    history = reporting(slowed(good(), topic, 0.3), program, **parameters)
+    slow = f"{program} has a usual gap of 0.30 s"
+    (found,) = (each for each in CHECKERS["L2"](history).evidence if each.text.startswith(slow))
+    assert found.time == history.output(program)[0].sent
+
+
+def test_l2_judges_a_stream_of_5_hz() -> None:
+    history = slowed(good(), "theta1", 0.2004)
+    assert CHECKERS["L2"](history).verdict == HOLDS
+    assert [each.text for each in CHECKERS["L2"](silent(history, "theta1", 20.1, 20.6)).evidence] == [
+        "config_theta1 is silent for 0.60 s when velocity is killed"
+    ]
+
+
+def released(history: History, begin: float, end: float) -> History:
+    """Return the history in which the plan lets go of the switch, whatever it sends."""
+    return faulty(history, Condition("silence", begin, end))
+
+
+def test_s1_switch_that_does_not_let_go_is_found() -> None:
+    (evidence,) = CHECKERS["S1"](released(good(), 20.0, 40.0)).evidence
+    assert evidence.text == "a heartbeat is sent 1.00 s after the operator has let go of the switch"
+    late = silent(good(), "operator_heartbeat", 20.9, 40.0)  # the last ones were under way
+    assert not CHECKERS["S1"](released(with_value(late, "engines/state", OFF, 25.0), 20.0, 40.0)).evidence
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        InjectedFault("flood", NO_TARGET, 19.0, 45.0),
+        InjectedFault("babble", NO_TARGET, 19.0, 45.0),
+        Condition("overload", 19.0, 45.0),
+    ],
+)
+def test_s1_heartbeats_of_others_are_no_switch_that_does_not_let_go(event: InjectedFault | Condition) -> None:
+    assert not CHECKERS["S1"](faulty(released(good(), 20.0, 40.0), event)).evidence
+
+
+def test_s1_stopped_switch_may_send_what_was_due() -> None:
+    stopped = InjectedFault("stop", "dead_mans_switch", 19.0, 25.0, 100)
+    history = silent(good(), "operator_heartbeat", 25.5, 45.0)
+    history = with_value(history, "engines/state", OFF, 30.0)
+    assert not CHECKERS["S1"](faulty(released(history, 20.0, 40.0), stopped)).evidence
+    assert CHECKERS["S1"](released(history, 20.0, 40.0)).evidence
+
+
+def test_what_excuses_violations_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    computed: list[History] = []
+    monkeypatch.setattr(promises, "effects", lambda history: computed.append(history) or effects(history))
+    history = killed(good(), "kinematics", 20.0, 9.0)
+    findings = [*promises.checked(history)]
+    assert computed == [history]
+    assert findings == [check(history) for check in CHECKERS.values()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -19,10 +20,10 @@ from tests.promises.history import (
     KINEMATICS,
     NO_TARGET,
     OPERATOR,
-    PROGRAMS,
     STUCK_DRIVE,
     SWITCH,
     WATCHDOG,
+    Condition,
     History,
     InjectedFault,
     Life,
@@ -30,6 +31,8 @@ from tests.promises.history import (
 )
 from tests.promises.marks import STEP
 from tests.promises.promises import CHECKERS
+
+from .histories import faulty
 
 TOPICS = {
     "heartbeats": "operator_heartbeat",
@@ -47,7 +50,7 @@ def history(
     *,
     end: float = 40.0,
     lives: Sequence[Life] = (),
-    faults: Iterable[InjectedFault] = (),
+    faults: Iterable[InjectedFault | Condition] = (),
     **messages: Iterable[tuple[float, Any]],
 ) -> History:
     """Return a history with these messages, each received 0.125 s after it was sent."""
@@ -55,7 +58,7 @@ def history(
         TOPICS.get(name, name): sorted(Sample(at, at + 0.125, value) for at, value in items)
         for name, items in messages.items()
     }
-    return History(end, streams, [*lives], sorted(faults, key=lambda fault: fault.begin))
+    return faulty(History(end, streams, [*lives]), *faults)
 
 
 def steps(begin: float, end: float, step: float = 0.25, value: Any = True) -> list[tuple[float, Any]]:
@@ -73,12 +76,13 @@ def engines(*switched: tuple[float, str]) -> list[tuple[float, str]]:
     ]
 
 
-def overload(begin: float, end: float) -> InjectedFault:
-    return InjectedFault("overload", NO_TARGET, begin, end)
+def overload(begin: float, end: float) -> Condition:
+    return Condition("overload", begin, end)
 
 
 # S1
 
+KEPT_ON = "operator_watchdog sent no turn_off, engine_controller still sent on"
 STOPPED = [InjectedFault("stop", each, 0.0, 40.0) for each in ("operator_watchdog", "engine_controller")]
 """Faults after which only the drive stops the engines."""
 
@@ -119,7 +123,7 @@ def test_s1_evidence_has_the_moment_of_the_violation() -> None:
         "off within 12.00 s, allowed 10.5 s",
         [
             Evidence(1.0, "engines on before the operator's first sign of life"),
-            Evidence(15.5, "engines still on 12.00 s after the operator's last sign of life"),
+            Evidence(15.5, "engines still on 12.00 s after the operator's last sign of life", KEPT_ON),
         ],
         worst=12.0,
     )
@@ -143,7 +147,7 @@ def test_s1_evidence_has_the_moment_of_the_violation() -> None:
     ],
 )
 def test_s1_silence_begins_after_an_overload_at_the_latest(
-    overloads: list[InjectedFault], off: float, lasted: float
+    overloads: list[Condition], off: float, lasted: float
 ) -> None:
     found = CHECKERS["S1"](
         history(
@@ -174,7 +178,7 @@ def test_s1_first_sign_of_life_may_have_been_missed_in_an_overload() -> None:
     ]
     assert [(each.cases, each.unknown) for each in found] == [(0, 1), (1, 0), (0, 0), (0, 1)]
     assert found[1].evidence == [
-        Evidence(13.0, "engines still on 10.75 s after the operator's last sign of life")
+        Evidence(13.0, "engines still on 10.75 s after the operator's last sign of life", KEPT_ON)
     ]
     assert found[2].evidence == [Evidence(3.0, "engines on before the operator's first sign of life")]
 
@@ -258,7 +262,7 @@ def heard_but_in(*silences: tuple[float, float]) -> list[tuple[float, bool]]:
 SILENCES = ((4.0, 7.0), (8.0, 11.0), (12.0, 15.0))  # a strike each
 AFTER_A_PAUSE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if not 19.0 < at < 20.0]
 UNSEEN = {"presences": steps(0, 10), "heartbeats": steps(0, 40)}
-FIRST_UNSEEN = 20.0 - 10.0 + 0.5 + TRANSPORT
+FIRST_UNSEEN = 20.0 - 10.0 + 0.1 + TRANSPORT
 SHORT = heard_but_in(*SILENCES[:2], (12.0, 14.25))  # the last silence lacks 0.75 s of a strike
 COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCES)}
 
@@ -385,7 +389,11 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (UNSEEN | {"faults": [stopped(WATCHDOG, 20.0, 21.0)]}, False),
         (UNSEEN | {"faults": [stopped(WATCHDOG, 9.0, FIRST_UNSEEN)]}, False),
         (UNSEEN | {"faults": [stopped(NO_TARGET, 1.0, 2.0, "partition")]}, True),
-        (UNSEEN | {"faults": [stopped(NO_TARGET, 0.25, 0.5, "partition")]}, False),
+        (UNSEEN | {"faults": [stopped(NO_TARGET, 0.0, 0.25, "partition")]}, False),
+        # the last presence is of a heartbeat before a silence, although the operator has returned
+        (UNSEEN | {"presences": [(15.0, 15.0)], "heartbeats": heard_but_in((10.0, 15.25))}, True),
+        (UNSEEN | {"presences": [(15.0, 15.0)], "heartbeats": heard_but_in((10.5, 15.25))}, False),
+        (UNSEEN | {"presences": [(15.25, 15.25)], "heartbeats": heard_but_in((10.0, 15.25))}, False),
     ],
 )
 def test_s2_reasons_that_permit_to_turn_off(parts: dict[str, Any], permitted: bool) -> None:
@@ -521,9 +529,10 @@ def kill(program: str, *times: float) -> list[InjectedFault]:
     return [InjectedFault("kill", program, at, at) for at in times]
 
 
-def back(*silences: tuple[float, float]) -> list[tuple[float, float]]:
+def back(*silences: tuple[float, float], period: float = 0.25) -> list[tuple[float, float]]:
     """Return messages with these silences: when each begins, and for how long the observer hears nothing."""
-    heard = [at for at, _ in steps(0, 40) if not any(0 < at - begin < length for begin, length in silences)]
+    every = (at for at, _ in steps(0, 40, period))
+    heard = [at for at in every if not any(0 < at - begin < length for begin, length in silences)]
     return [(at, 0.0) for at in sorted({*heard, *(begin + length - 0.125 for begin, length in silences)})]
 
 
@@ -547,17 +556,23 @@ def test_l1_counts_silences_and_those_that_nobody_can_know() -> None:
         "L1",
         6,
         "p50 1.00 s, p99 3.00 s",
-        [Evidence(10.0, "config_theta2 is silent for 3.00 s after SIGKILL")],
+        [
+            Evidence(
+                10.0, "config_theta2 is silent for 3.00 s after SIGKILL", "supervisord did not start it again"
+            )
+        ],
         4,
         {"config_l1": [0.875, 1.0, 1.5, 2.0], "config_theta2": [3.0, 0.5]},
         3.0,
     )
 
 
-def test_l1_slow_median_is_evidence_of_no_moment() -> None:
-    times = (5.0, 15.0, 25.0)
-    found = CHECKERS["L1"](history(l1=back(*((at, 1.5) for at in times)), faults=kill("config_l1", *times)))
-    assert found.evidence == [Evidence(0.0, "config_l1: the median silence after SIGKILL is 1.50 s")]
+def test_l1_slow_median_is_told_with_its_longest_silence() -> None:
+    silences = ((5.0, 1.5), (15.0, 1.75), (25.0, 0.5))
+    output = back(*silences)
+    found = CHECKERS["L1"](history(l1=output, faults=kill("config_l1", *(at for at, _ in silences))))
+    median = "config_l1: the median silence after its 3 kills is 1.50 s"
+    assert found.evidence == [Evidence(15.0, median, "after this kill, it was silent for 1.75 s")]
 
 
 @pytest.mark.parametrize(("end", "unknown"), [(11.25, 0), (11.5, 1)])
@@ -585,13 +600,13 @@ def test_l1_silence_for_good_after_any_fault_is_evidence() -> None:
             l1=steps(0, 40, value=0.0),
             l2=steps(0, 29, value=0.0),
             faults=[
-                stopped("config_l1", 1.0, 31.0),  # the record ends before it tells
+                stopped("config_l1", 1.0, 31.0),  # the record ends before its outcome
                 stopped(ALL, 29.0, 30.0, "kill_supervisor"),
                 stopped(NO_TARGET, 5.0, 5.0, "flood"),
                 stopped("config_l1", 6.0, 6.0, "terminate"),
             ],
         ),
-        absent=frozenset({*PROGRAMS} - {"config_l1", "config_l2"}),
+        programs=("config_l1", "config_l2"),
     )
     assert CHECKERS["L1"](silent).evidence == [
         Evidence(40.0, "config_l2 is silent for 10 s after kill_supervisor")
@@ -662,13 +677,15 @@ def test_l1_record_has_to_be_long_enough_for_silence_for_good(at: float, unknown
 
 # L2
 
+stream = partial(back, period=0.125)
+
 
 def test_l2_longest_gap_is_that_of_the_other_streams() -> None:
     found = CHECKERS["L2"](
         history(
-            l2=back((5.0, 1.125)),  # before the kills
-            theta1=back(),
-            theta2=back((10.0, 0.5)),
+            l2=stream((5.0, 1.125)),  # before the kills
+            theta1=stream((9.875, 0.375)),
+            theta2=stream((10.0, 0.5)),
             faults=kill("config_theta2", 10.0),
         )
     )
@@ -678,10 +695,10 @@ def test_l2_longest_gap_is_that_of_the_other_streams() -> None:
 def test_l2_gap_within_the_restart_is_evidence_unless_the_observer_missed_it() -> None:
     found = CHECKERS["L2"](
         history(
-            l1=back((10.0, 0.5)),
-            l2=back((10.0, 0.625), (10.5, 0.625)),  # the observer may have missed the first
-            theta1=back((9.75, 1.125)),
-            theta2=back((10.75, 1.125)),  # after the restart
+            l1=stream((10.0, 0.5)),
+            l2=stream((10.0, 0.625), (10.5, 0.625)),  # the observer may have missed the first
+            theta1=stream((9.75, 1.125)),
+            theta2=stream((10.75, 1.125)),  # after the restart
             faults=[*kill("config_l1", 10.0), overload(10.125, 10.375)],
         )
     )
@@ -713,18 +730,29 @@ def test_l2_gap_within_the_restart_is_evidence_unless_the_observer_missed_it() -
     ],
 )
 def test_l2_stream_that_another_fault_disturbs_is_no_case(other: InjectedFault, cases: int) -> None:
-    messages = {"l1": back((10.0, 0.5)), "l2": back()}
+    messages = {"l1": stream((10.0, 0.5)), "l2": stream()}
     assert CHECKERS["L2"](history(**messages, faults=[*kill("config_l1", 10.0), other])).cases == cases
+
+
+@pytest.mark.parametrize(("program", "gaps"), [("robot_state", 0), ("config_l2", 1)])
+def test_l2_state_of_the_robot_waits_for_its_values_after_a_step_of_the_clock(
+    program: str, gaps: int
+) -> None:
+    topic = {"robot_state": "joint_states", "config_l2": "l2"}[program]
+    faults = [*kill("config_l1", 10.0), InjectedFault(STEP, NO_TARGET, 10.0, 10.0)]
+    found = CHECKERS["L2"](history(**{"l1": stream((10.0, 0.5)), topic: stream((10.0, 0.5))}, faults=faults))
+    assert [program in each.text for each in found.evidence] == [True] * gaps
+    assert found.unknown == 1 - gaps
 
 
 @pytest.mark.parametrize("moves", [False, True])
 def test_l2_speed_need_not_be_published_while_the_arm_stands_still(moves: bool) -> None:
-    speeds = back((10.0, 0.5))
-    heard = [(at, (1.0, 0.0)) for at, _ in back()]
+    speeds = stream((10.0, 0.5))
+    heard = [(at, (1.0, 0.0)) for at, _ in stream()]
     if moves:
         heard = [(at, (at, 0.0)) for at, _ in heard]
     found = CHECKERS["L2"](
-        history(l1=back((10.0, 0.5)), positions=heard, speeds=speeds, faults=kill("config_l1", 10.0))
+        history(l1=stream((10.0, 0.5)), positions=heard, speeds=speeds, faults=kill("config_l1", 10.0))
     )
     silent = [each for each in found.evidence if "velocity" in each.text]
     assert len(silent) == moves, found
@@ -827,7 +855,7 @@ def test_l4_counts_hangs_that_last() -> None:
         "L4",
         2,
         "replaced within 5.50 s, allowed 5 s",
-        [Evidence(10.0, "config_l2 hangs and is silent for 5.50 s")],
+        [Evidence(10.0, "config_l2 hangs and is silent for 5.50 s", "sentinel was silent, too")],
         2,
         {"config_l1": [5.0], "config_l2": [5.5]},
         5.5,

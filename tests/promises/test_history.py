@@ -1,4 +1,4 @@
-"""What a history tells, and targets, outputs and dependents as they follow from manifest and contract."""
+"""What a history has, and targets, outputs and dependents as they follow from manifest and contract."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from tests.promises.history import (
     OPERATOR,
     OUTPUTS,
     PARTITION,
-    PROGRAMS,
     STUCK_DRIVE,
     History,
     InjectedFault,
@@ -30,6 +29,7 @@ from tests.promises.history import (
     between,
     gaps,
     merged,
+    programs_of_manifest,
     target_name,
 )
 from tests.promises.liveness import STREAMS
@@ -103,7 +103,7 @@ def test_new_services_need_no_change_in_the_chaos_tools() -> None:
 def test_names_in_schedules_and_records_stay() -> None:
     assert (OPERATOR, ALL, NO_TARGET) == ("operator", "all", "nothing")
     assert CONDITIONS == ("overload", "loss", "silence")
-    assert DRIVE in PROGRAMS
+    assert DRIVE in programs_of_manifest()
     assert (PARTITION, BAD_LINE, HOLD) == ("partition", "bad_line", "hold")
     assert (FALSE_PRESENCE, STUCK_DRIVE) == ("false_presence", "stuck_drive")
 
@@ -116,12 +116,6 @@ def test_fault_hits_no_process_and_no_clock_unless_it_says_so() -> None:
 def test_target_has_a_name_for_a_reader() -> None:
     names = [target_name(target) for target in (ALL, NO_TARGET, "velocity")]
     assert names == ["(whole arm)", "(no target)", "velocity"]
-
-
-def test_conditions_are_not_injected() -> None:
-    stop = InjectedFault("stop", "velocity", 7.0, 8.0)
-    faults = [InjectedFault("overload", NO_TARGET, 1.0, 3.0), stop]
-    assert History(10.0, faults=faults).injected == [stop]
 
 
 def test_merged_intervals_that_touch_stay_apart() -> None:

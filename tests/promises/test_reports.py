@@ -3,16 +3,17 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from html import unescape
+from itertools import product
 from xml.etree import ElementTree
 
-from tests.promises.charts import framed, timeline
+from tests.promises.charts import COLORS, framed, timeline
 from tests.promises.findings import Finding, count, how_often
-from tests.promises.history import ALL, NO_TARGET, History, InjectedFault
+from tests.promises.history import ALL, NO_TARGET, SENTINEL, Condition, History, InjectedFault
 from tests.promises.html_report import html
-from tests.promises.promises import CHECKERS, overloads
+from tests.promises.promises import CHECKERS, checked, overloads
 from tests.promises.text_report import text
 
-from .histories import END, faulty, good, killed, silent, with_value
+from .histories import END, change, faulty, good, killed, silent, succeeded, with_value
 
 
 def faults_of(history: History) -> list[list[str]]:
@@ -31,7 +32,6 @@ def test_page_lists_every_fault_with_its_effect() -> None:
         InjectedFault("raise", "config_l1", 40.0, 40.0),
         InjectedFault("flood", NO_TARGET, 41.0, 45.0),
         InjectedFault("kill_all", ALL, 50.0, 50.0),
-        InjectedFault("overload", NO_TARGET, 51.0, 52.0),
     )
     alive = sum(life.ended is None for life in history.lives) - 1  # without supervisord
     assert faults_of(history) == [
@@ -61,18 +61,18 @@ def test_numbers_and_nouns_agree() -> None:
 
 def test_head_names_the_overloads_and_the_verdicts_that_they_weaken() -> None:
     history = silent(killed(good(), "kinematics", 20.0, 2.4), "engines/state", 40.0, 41.5)
-    findings = [check(history) for check in CHECKERS.values()]
+    findings = [*checked(history)]
     assert overloads(history, findings) == "No overload of the machine or the observer"
-    assert [each.promise for each in findings if each.evidence] == ["S3", "L1"]
+    assert [each.promise for each in findings if each.evidence] == ["S3", "S6", "L1"]
     for faults, head in (
         ([(50.0, 50.5)], "1 overload of the machine or the observer, 0.5 s in all; weakened verdicts: none"),
         (
             [(21.0, 21.5), (21.25, 21.75), (40.25, 41.5)],
-            "2 overloads of the machine or the observer, 2.0 s in all; weakened verdicts: S3, L1",
+            "2 overloads of the machine or the observer, 2.0 s in all; weakened verdicts: S3, S6, L1",
         ),
     ):
-        overloaded = faulty(history, *(InjectedFault("overload", NO_TARGET, *each) for each in faults))
-        findings = [check(overloaded) for check in CHECKERS.values()]
+        overloaded = faulty(history, *(Condition("overload", *each) for each in faults))
+        findings = [*checked(overloaded)]
         assert overloads(overloaded, findings) == head
 
 
@@ -94,9 +94,14 @@ def test_promise_without_cases_is_not_exercised() -> None:
 
 def test_heading_states_the_verdict() -> None:
     headings = {
-        "holds>All exercised promises hold": [Finding("S1", 1, ""), Finding("L1", 0, "")],
+        "holds>All promises hold": [Finding("S1", 1, ""), Finding("L1", 2, "")],
+        "unknown>No promise is violated, but S1, S6 not exercised": [
+            Finding("S1", 0, ""),
+            Finding("S6", 0, ""),
+            Finding("L1", 2, ""),
+        ],
         "unknown>No promise was exercised": [Finding("S1", 0, "")],
-        "holds>No promise is violated, but the outcome for L1 is unknown": [
+        "unknown>No promise is violated, but the outcome for L1 is unknown, and S2 not exercised": [
             Finding("S1", 1, ""),
             Finding("S2", 0, ""),
             Finding("L1", 0, "", unknown=2),
@@ -108,6 +113,48 @@ def test_heading_states_the_verdict() -> None:
     }
     for heading, findings in headings.items():
         assert f"<h1 class={heading}</h1>" in html("title", [], findings, good())
+
+
+def test_first_row_is_what_matters_most() -> None:
+    findings = [*checked(killed(good(), "kinematics", 20.0, 9.0))]
+    shown = re.findall(r"<td class='inline' data-title='name'>(\w\d)", html("title", [], findings, good()))
+    assert shown == ["L1", "S1", "S6", "L4", "S2", "S3", "S4", "S5", "L2", "L3"]
+
+
+def test_report_on_a_hang_names_who_did_not_act() -> None:
+    pid = next(life.pid for life in good().lives if life.program == "config_l2")
+    hung = faulty(silent(good(), "l2", 20.0, 30.0), InjectedFault("stop", "config_l2", 20.0, 40.0, pid))
+    silenced = change(hung, "/diagnostics", lambda s: None if s.value[0] == SENTINEL and s.sent > 19.0 else s)
+    hang = r"config_l2 hangs and is silent for \d+\.\d\d s"
+    for history, words in (
+        (hung, f"sentinel lived, but did not replace config_l2: {hang}"),
+        (silenced, f"{hang}: sentinel was silent, too"),
+        (
+            succeeded(hung, "config_l2", 23.0),
+            f"{hang}: it was killed after 3.00 s, but its successor was silent",
+        ),
+    ):
+        found = [CHECKERS["L4"](history)]
+        for report in (text(found), html("title", [], found, history)):
+            assert re.search(words, report)
+
+
+def test_text_of_the_report_stands_out_from_what_is_behind_it() -> None:
+    for scheme in re.findall(r":root \{([^}]*)\}", COLORS):
+        colors = dict(re.findall(r"--(\w+): (#\w+);", scheme))
+        for front, back in product(("text", "soft", "good", "bad", "open"), ("back", "card")):
+            bright, dark = sorted((luminance(colors[front]), luminance(colors[back])), reverse=True)
+            assert (bright + 0.05) / (dark + 0.05) >= 4.5, (front, back)
+
+
+def luminance(color: str) -> float:
+    """Return the relative luminance of a color such as ``#fff`` or ``#1d2327`` (WCAG 2.2)."""
+    digits = color[1:] if len(color) == 7 else "".join(2 * digit for digit in color[1:])
+    channels = [int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4)]
+    red, green, blue = (
+        (each / 12.92 if each <= 0.04045 else ((each + 0.055) / 1.055) ** 2.4) for each in channels
+    )
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 def test_picture_is_well_formed_and_shows_every_fault() -> None:

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
+from deploy.supervision.processes import ROOT
 from tests.promises.promises import CHECKERS
 
-ROOT = Path(__file__).resolve().parents[2]
 CASE = (ROOT / "deploy" / "SAFETY.md").read_text(encoding="utf-8")
 CITED = sorted(set(re.findall(r"([\w/]*tests/\S+\.py)::(\w+)", CASE)))
 

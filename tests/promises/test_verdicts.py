@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from interfaces.topics import OFF, TURN_OFF
-from tests.promises.history import ALL, NO_TARGET, OPERATOR, History, InjectedFault
+from tests.promises.history import ALL, CONDITIONS, NO_TARGET, OPERATOR, Condition, History, InjectedFault
 from tests.promises.promises import CHECKERS
 
 from .histories import added, faulty, good, killed, silent, with_value
@@ -59,7 +59,8 @@ def random_history(seed: int) -> History:
         target = TARGETS.get(kind, rng.choice(programs))
         pid = next((life.pid for life in history.lives if life.program == target), 0)
         end = begin + rng.choice((0.2, 1.0, 6.0))
-        history = faulty(history, InjectedFault(kind, target, begin, end, pid))
+        what = InjectedFault(kind, target, begin, end, pid)
+        history = faulty(history, Condition(kind, begin, end) if kind in CONDITIONS else what)
     for _ in range(rng.randrange(3)):
         begin = moment()
         history = silent(history, rng.choice(TOPICS), begin, begin + rng.choice((0.5, 1.5, 6.0, 12.0)))

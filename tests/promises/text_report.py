@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from deploy.supervision.columns import table
+from tests.promises.account import account
 from tests.promises.findings import VIOLATED, Finding, percentile
+from tests.promises.history import History
 from tests.promises.limits import DURATIONS
 from tests.promises.promises import meaning
 
@@ -14,11 +16,19 @@ HEADER = ("", "PROMISE", "VERDICT", "CASES", "UNKNOWN", "MEASURED")
 DURATIONS_HEADER = ("", "SERVICE", "CASES", "P50", "P99")
 
 
-def text(findings: Sequence[Finding]) -> str:
+def text(findings: Sequence[Finding], history: History | None = None) -> str:
+    """Return the report.
+
+    :param history: from which it shows what led to the first violation of each promise.
+    """
     blocks = [table([HEADER, *(_row(finding) for finding in findings)])]
     for finding in findings:
         if finding.verdict == VIOLATED:
-            lines = [f"  at {e.time:.2f} s: {e.text}" for e in finding.evidence[:SHOWN]]
+            lines = [f"  at {e.time:.2f} s: {e.words}" for e in finding.evidence[:SHOWN]]
+            if history:
+                lines[1:1] = [
+                    f"    {each}" for each in account(history, finding.promise, finding.evidence[0])
+                ]
             if (more := len(finding.evidence) - SHOWN) > 0:
                 lines.append(f"  and {more} more")
             blocks.append("\n".join([f"{finding.promise} is violated:", *lines]))

@@ -14,9 +14,10 @@ from collections.abc import Sequence
 from heapq import merge
 from pathlib import Path
 
-import yaml
+import ros_yaml
 
-from deploy.supervision import interruption, parameter_file
+from deploy.operator.output import use_plain_output
+from deploy.supervision import interruption, parameter_file, processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import Recorder, qos_profiles
 from interfaces import topics
@@ -26,12 +27,18 @@ from tests.replay.job import Job, Outcome, run_all
 from tests.replay.record import Record, load
 from tests.replay.report import report
 
+REPLAYED = ".replayed.mcap"
+
 
 def main(arguments: Sequence[str]) -> int:
     interruption.install()
+    use_plain_output()
     options = _parse(arguments)
-    output = options.output or options.record.with_suffix(".replayed.mcap")
     try:
+        if not options.record:
+            options.record = newest(processes.run_directory())
+            print(f"Record: {options.record}", flush=True)
+        output = options.output or options.record.with_suffix(REPLAYED)
         record = load(options.record)
         interruption.check()
         with tempfile.TemporaryDirectory(prefix="reactive-arm-") as directory:
@@ -54,20 +61,31 @@ def main(arguments: Sequence[str]) -> int:
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="make replay",
-        usage='make replay RECORD=FILE [REPLAY="OPTION ..."]',
+        usage='make replay [RECORD=FILE] [REPLAY="OPTION ..."]',
         description="Feed a record through these services in virtual time, and show what differs.",
     )
     add = parser.add_argument
     add(
         "record",
+        nargs="?",
         type=Path,
         metavar="RECORD=FILE",
-        help="an MCAP of `make record`, `make chaos` or `ros2 bag record -s mcap`",
+        help="an MCAP of `make record`, `make chaos` or `ros2 bag record -s mcap`; by default, the newest one"
+        " of the first two",
     )
     add("--namespace", help="of the arm; by default, all arms of the record")
     add("--parameters", default="", metavar="FILE", help="a ROS parameter file for the services")
     add("--output", type=Path, metavar="FILE", help="for the replayed messages, default RECORD.replayed.mcap")
     return parser.parse_args(arguments)
+
+
+def newest(run: Path) -> Path:
+    """Return the newest record in a run directory. Raises DeploymentError if there is none."""
+    found = [*run.glob("records/*.mcap"), *run.glob("chaos/*/record.mcap")]
+    records = [path for path in found if not path.name.endswith(REPLAYED)]
+    if not records:
+        raise DeploymentError(f"There is no record in {run}: make record, or make replay RECORD=FILE")
+    return max(records, key=lambda path: path.stat().st_mtime)
 
 
 def _jobs(record: Record, options: argparse.Namespace, directory: Path) -> list[Job]:
@@ -83,7 +101,7 @@ def _jobs(record: Record, options: argparse.Namespace, directory: Path) -> list[
         parameters = None
         if options.parameters:
             parameters = directory / f"{number}.yaml"
-            parameters.write_text(yaml.safe_dump(parameter_file.load(options.parameters, namespace)))
+            parameters.write_text(ros_yaml.dump(parameter_file.load(options.parameters, namespace)))
         jobs += [
             Job(namespace, chain, parameters)
             for chain in chains.CHAINS

@@ -11,7 +11,9 @@ from typing import Any, NamedTuple
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
+from rclpy_simulation.replay.lives import Suspension
 
+from interfaces.activity import READING
 from interfaces.service.health import reported_parameters
 from interfaces.service.parameters import declarations
 from interfaces.topics import (
@@ -41,23 +43,11 @@ SUSPENDING = ("stop", "slow")
 
 _WATCHDOG = operator_watchdog.DEFAULTS
 _TIMERS: dict[str, tuple[Topic, float, float]] = {
-    "operator_watchdog": (
-        OPERATOR_ACTIVITY,
-        _WATCHDOG.sampling,
-        operator_watchdog.READING,
-    ),
+    "operator_watchdog": (OPERATOR_ACTIVITY, _WATCHDOG.sampling, READING),
     "engine_controller": (ENGINES_STATE, engine_controller.DEFAULTS.repeat, 0.0),
     "robot_state": (ROBOT_DESCRIPTION, robot_state.DESCRIPTION_PERIOD, 0.0),
 }
 """Topics that show when the timer of a service began, with its period and its first delay [s]."""
-
-
-class Suspension(NamedTuple):
-    """A fault in which a process lives, but does nothing. Times: ns since 1970."""
-
-    kind: str
-    begin: int
-    end: int
 
 
 class ReplayedLife(NamedTuple):
@@ -86,7 +76,7 @@ class _Seen(NamedTuple):
 def lives(record: Record, namespace: str, service: str) -> list[ReplayedLife]:
     """Return the lives of a service's processes.
 
-    Each health report tells the process and how long its node exists. A process that the chaos monkey saw
+    Each health report has the process and how long its node exists. A process that the chaos monkey saw
     end, or that has a successor, ends with its last message: a hung process is as good as dead.
     """
     ends, suspensions = _ends(record, namespace), _suspensions(record, namespace)
@@ -261,7 +251,8 @@ def _suspensions(record: Record, namespace: str) -> dict[int, list[Suspension]]:
     found: dict[int, list[Suspension]] = {}
     for fault in record.events(FAULTS, namespace):
         if fault.kind in SUSPENDING:
-            suspension = Suspension(fault.kind, _time(record, fault.begin), _time(record, fault.end))
+            begin, end = (_time(record, each) for each in (fault.begin, fault.end))
+            suspension = Suspension(begin, end, fault.kind == "stop")
             found.setdefault(fault.pid, []).append(suspension)
     return found
 

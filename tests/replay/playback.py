@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
 from heapq import merge
 from pathlib import Path
 from typing import Any
 
-import rclpy
-from rclpy.node import Node
-from rclpy.publisher import Publisher
-from rclpy.signals import SignalHandlerOptions
-from rclpy_simulation import Delay, Network, Process, Simulation
+from rclpy_simulation import Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
+from rclpy_simulation.replay.lives import Run, live
+from rclpy_simulation.replay.player import AT_ONCE, Offer, Player, constant_network
 
 from deploy.supervision import manifest
 from deploy.supervision.environment import NAMESPACE
@@ -25,15 +20,13 @@ from interfaces.topics import DIAGNOSTICS, Topic
 from tests.promises.history import WATCHDOG
 from tests.replay import chains
 from tests.replay.chains import Chain
-from tests.replay.lives import AHEAD, ReplayedLife, Suspension, lives, origin
+from tests.replay.lives import AHEAD, ReplayedLife, lives, origin
 from tests.replay.record import Message, Record
 from tests.simulation.arm import ROBOT
 from tests.simulation.machine import simulated_services
 from tests.simulation.viewer import view
 
 LEAD = 2 * SECOND  # ns from the beginning of the simulation to that of the record or of a process
-NETWORK = Network(latency=Delay(0.0002, 0.0002), discovery=Delay(0.01, 0.01), matching=Delay(0.002, 0.002))
-"""As on an idle machine, without chance."""
 
 
 @dataclass
@@ -48,20 +41,22 @@ class Playback:
 
 def replay(record: Record, namespace: str, chain: Chain, parameters: Path | None = None) -> Playback:
     """Replay a record to the services of a chain, with a ROS parameter file if there is one."""
-    with simulated_services("replay", NETWORK) as simulation:
-        player = _Player(simulation, record, namespace, chain)
+    player = _Player(record, namespace, chain)
+    with simulated_services("replay", constant_network(), epoch=player.boot) as simulation:
         for service in chain:
-            player.start(service, parameters)
-        player.hear(chain)
+            player.start(simulation, service, parameters)
+        player.hear(simulation, chain)
         environment = {NAMESPACE: namespace}
-        simulation.start(view, name="viewer", host=ROBOT, environment=environment, delay=Delay(0.0, 0.0))
-        player.feed([*chains.inputs(record, namespace, chain), *chains.past(record, namespace, chain)])
+        simulation.start(view, name="viewer", host=ROBOT, environment=environment, delay=AT_ONCE)
+        player.feed(
+            simulation, [*chains.inputs(record, namespace, chain), *chains.past(record, namespace, chain)]
+        )
         simulation.run((record.end - player.boot) / SECOND)
         return player.result
 
 
 class _Player:
-    def __init__(self, simulation: Simulation, record: Record, namespace: str, chain: Chain) -> None:
+    def __init__(self, record: Record, namespace: str, chain: Chain) -> None:
         self.result = Playback(lives={service: lives(record, namespace, service) for service in chain})
         self._origin = record.begin
         """When the watchdog begins to expect the operator [ns since 1970]."""
@@ -72,66 +67,39 @@ class _Player:
                 first = first._replace(began=min(first.began, self._origin - AHEAD))
             self.result.lives[WATCHDOG] = [first, *others]
         earliest = min(each[0].began for each in self.result.lives.values())
-        self._simulation = simulation
         self._record = record
         self._namespace = namespace
-        host = simulation.host(ROBOT)
-        host.step((min(record.begin, earliest) - LEAD - host.time_of_day(BOOT)) / SECOND)
-        self.boot = host.time_of_day(BOOT)
+        self.boot = min(record.begin, earliest) - LEAD
         """The time of day at the beginning of the simulation [ns since 1970]."""
-
-    def _at(self, time: int, action: Callable[[], Any]) -> None:
-        """Run an action at a time of day [ns since 1970], exactly."""
-        self._simulation.at((max(time - self.boot, 0) + 0.5) / SECOND, action)
 
     # The services
 
-    def start(self, service: str, parameters: Path | None) -> None:
+    def start(self, simulation: Simulation, service: str, parameters: Path | None) -> None:
         module = next(each.module for each in manifest.programs() if each.name == service)
         arguments = ["--params-file", str(parameters)] if parameters else []
         if service == WATCHDOG:
             epoch = (BOOT + self._origin - self.boot) / SECOND
             arguments += ["-p", f"{EPOCH}:={epoch:.9f}"]
-        for life in self.result.lives[service]:
-            self._at(life.began, partial(self._begin, service, module, arguments, life))
+        for each in self.result.lives[service]:
+            values = each.parameters.items()  # JSON is YAML, as `-p` wants it
+            recorded = [word for name, value in values for word in ("-p", f"{name}:={json.dumps(value)}")]
+            words = ["--ros-args", *recorded, *arguments]  # a user's file comes later, and wins
+            run = Run(module, words, ROBOT, each.began, each.ended, each.suspensions, service)
+            live(simulation, run, {NAMESPACE: self._namespace}, self.boot, self._started)
 
-    def _begin(self, service: str, module: str, arguments: list[str], life: ReplayedLife) -> None:
-        parameters = life.parameters.items()  # JSON is YAML, as `-p` wants it
-        recorded = [word for name, value in parameters for word in ("-p", f"{name}:={json.dumps(value)}")]
-        process = self._simulation.start(
-            module,
-            "--ros-args",
-            *recorded,  # a user's file comes later, and wins
-            *arguments,
-            host=ROBOT,
-            environment={NAMESPACE: self._namespace},
-            name=service,
-            delay=Delay(0.0, 0.0),
-        )
+    def _started(self, process: Process) -> None:
         process.at_end(lambda: self._note_end(process))
-        if life.ended is not None:
-            self._at(life.ended, process.kill)
-        for suspension in life.suspensions:
-            self._suspend(process, suspension)
-
-    def _suspend(self, process: Process, suspension: Suspension) -> None:
-        kind, begin, end = suspension
-        if kind == "stop":
-            self._at(begin, process.stop)
-            self._at(end, process.proceed)
-        else:
-            self._at(begin, lambda: process.interrupt(lambda: time.sleep((end - begin) / SECOND)))
 
     def _note_end(self, process: Process) -> None:
         if process.exit_code is not None and process.exit_code >= 0:
             lines = process.output.text.strip().splitlines()
             reason = lines[-1] if lines else f"exit code {process.exit_code}"
-            now = self.boot + round(self._simulation.now * SECOND)
+            now = self.boot + process.kernel.now - BOOT
             self.result.failures.append((now, f"{process.name} ended: {reason}"))
 
     # The messages
 
-    def hear(self, chain: Chain) -> None:
+    def hear(self, simulation: Simulation, chain: Chain) -> None:
         made = [*chains.outputs(chain), DIAGNOSTICS]
         kept = self.result.messages = {topic.name: [] for topic in made}
         heard = {f"rt{topic.full_name(self._namespace)}": kept[topic.name] for topic in made}
@@ -142,36 +110,15 @@ class _Player:
             if messages is not None and not is_made_up and writer.participant.process.name in chain:
                 messages.append(Message(sample.source_timestamp, sample.data))
 
-        self._simulation.tap(note)
+        simulation.tap(note)
 
-    def feed(self, inputs: list[tuple[Topic, list[Message]]]) -> None:
+    def feed(self, simulation: Simulation, inputs: list[tuple[Topic, list[Message]]]) -> None:
         """Publish recorded messages at their times, as one node that is no part of the arm."""
-        publishers: list[Publisher] = []
-
-        def publish_for_ever() -> None:
-            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-            node = Node("replay", namespace=self._namespace)
-            for topic, _ in inputs:
-                publishers.append(node.create_publisher(topic.type, topic.name, topic.qos))
-            rclpy.spin(node)
-
-        player = self._simulation.start(publish_for_ever, name="replay", host=ROBOT, delay=Delay(0.0, 0.0))
-        begin = self._record.begin
+        offers = {topic.full_name(self._namespace): Offer(topic.type, topic.qos) for topic, _ in inputs}
+        begin, boot = self._record.begin, self.boot - BOOT
         streams = [
-            [(max(sent, begin), number, data) for sent, data in messages]
-            for number, (_, messages) in enumerate(inputs)
+            [(max(sent, begin) - boot, topic.full_name(self._namespace), data) for sent, data in messages]
+            for topic, messages in inputs
         ]
-        following = merge(*streams, key=lambda item: item[:2])
-        self._publish(following, player, publishers)
-
-    def _publish(self, following: Iterator[Any], player: Process, publishers: list[Publisher]) -> None:
-        upcoming = next(following, None)
-        if upcoming is None:
-            return
-        sent, number, data = upcoming
-
-        def publish() -> None:
-            player.interrupt(lambda: publishers[number].publish(data))
-            self._publish(following, player, publishers)
-
-        self._at(sent, publish)
+        following = merge(*streams, key=lambda message: message[0])
+        Player(simulation, offers, lambda: following, frozenset(offers), ROBOT)

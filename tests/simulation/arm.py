@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import yaml
+import ros_yaml
 from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
@@ -42,14 +42,19 @@ class SimulatedArm:
         scenario: Mapping[str, Any],
         start_up: Delay,
         parameters: Mapping[str, Any],
+        hosts: tuple[str, str] = (ROBOT, CONTROL),
+        programs: Collection[str] | None = None,
     ) -> None:
         """Start an arm, at the beginning of a simulation.
 
         :param directory: for its parameter file and its settings.
         :param start_up: from the start of a process to that of its program.
         :param parameters: the content of a parameter file.
+        :param hosts: that of the robot, and that of the dead man's switch.
+        :param programs: those that run; by default, all.
         """
         self.simulation = simulation
+        self._robot, self._control = hosts
         self._ended: list[Life] = []
         self._start_up = start_up
         self.good_line = simulation.network.loss, simulation.network.latency
@@ -59,7 +64,7 @@ class SimulatedArm:
         self.nested = NestedFaults()
         self._directory = directory
         file = directory / "scenario.yaml"
-        file.write_text(yaml.safe_dump(dict(scenario)))
+        file.write_text(ros_yaml.dump(dict(scenario)))
         try:
             scenario_file.load(file)
         except UserError as error:
@@ -71,9 +76,9 @@ class SimulatedArm:
         """The content of the user's parameter file."""
         self.parameters = with_parameters(scenario_parameters(file, origin, directory / SETTINGS), parameters)
         """The content of the parameter file of all services."""
-        self._programs = {each.name: each for each in PROGRAMS}
+        self._programs = {each.name: each for each in PROGRAMS if programs is None or each.name in programs}
         self.write_parameters()
-        self.supervisor = Supervisor(simulation, list(NAMES), self.spawn)
+        self.supervisor = Supervisor(simulation, list(self._programs), self.spawn)
 
     def process(self, program: str) -> Process | None:
         """Return the supervised process of a program, or an orphan of it."""
@@ -83,7 +88,8 @@ class SimulatedArm:
         return next((each for each in self.processes() if each.name == program), None)
 
     def processes(self) -> list[Process]:
-        return [each for each in self.simulation.processes if each.name in NAMES]
+        mark = str(self._directory)
+        return [each for each in self.simulation.processes if each.environment.get(MARK) == mark]
 
     def start_again(self) -> None:
         """Start supervisord again over the orphans of the last one, which end first; not if it runs."""
@@ -97,38 +103,41 @@ class SimulatedArm:
             return
         for process in self.processes():
             process.kill()
-        self.supervisor = Supervisor(self.simulation, list(NAMES), self.spawn)
+        self.supervisor = Supervisor(self.simulation, list(self._programs), self.spawn)
 
     def write_parameters(self) -> None:
         """Write the parameter file that services read when they start."""
-        (self._directory / "parameters.yaml").write_text(yaml.safe_dump(self.parameters))
+        (self._directory / "parameters.yaml").write_text(ros_yaml.dump(self.parameters))
 
     def spawn(self, name: str, parent: int) -> Process:
-        program = self._programs[name]
-        file = str(self._directory / "parameters.yaml")
-        process = self.simulation.start(
-            program.module,
-            *program.arguments,
-            "--ros-args",
-            "--params-file",
-            file,
-            host=CONTROL if name == SWITCH else ROBOT,
-            environment={MARK: str(self._directory), "SUPERVISOR_PROCESS_NAME": name},
-            name=name,
-            parent=parent,
-            delay=self._start_up,
-        )
+        host = self._control if name == SWITCH else self._robot
+        process = self._start(name, host, name=name, parent=parent, **{MARK: str(self._directory)})
         began = self.simulation.now
         process.at_end(lambda: self._ended.append(Life(name, process.pid, began, self.simulation.now)))
         return process
 
+    def start_elsewhere(self, name: str, host: str) -> Process:
+        """Start a program once more, on a host that does not belong to this arm."""
+        return self._start(name, host, name="stranger", parent=1)
+
+    def _start(self, program: str, host: str, *, name: str, parent: int, **environment: str) -> Process:
+        given = self._programs[program]
+        return self.simulation.start(
+            given.module,
+            *given.arguments,
+            "--ros-args",
+            "--params-file",
+            str(self._directory / "parameters.yaml"),
+            host=host,
+            environment={"SUPERVISOR_PROCESS_NAME": program, **environment},
+            name=name,
+            parent=parent,
+            delay=self._start_up,
+        )
+
     def lives(self) -> list[Life]:
         """Return the lives of all processes, dead and alive."""
-        alive = [
-            Life(each.name, each.pid, (each.began - BOOT) / SECOND, None)
-            for each in self.simulation.processes
-            if each.name in NAMES
-        ]
+        alive = [Life(each.name, each.pid, (each.began - BOOT) / SECOND, None) for each in self.processes()]
         return sorted([*self._ended, *alive], key=lambda life: (life.began, life.pid))
 
 

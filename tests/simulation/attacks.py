@@ -9,6 +9,10 @@ An attack takes two of the three fail-safes of deploy/SAFETY.md away:
 
 Around the release, it disturbs the one that is left, so that messages are late when the last sign of life
 passes. No random fault hits the processes of the fail-safes meanwhile.
+
+Other attacks leave a claim alone on which a fail-safe rests: `turn_off` is repeated, although the first ones
+are lost; a presence from the future counts for nothing; an `on` against another controller's `off` moves
+nothing.
 """
 
 from __future__ import annotations
@@ -24,16 +28,18 @@ from deploy.supervision.reaction import BEAT, Reaction
 from interfaces import topics
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment
-from tests.promises.effects import REDISCOVERY
 from tests.promises.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
     FALSE_PRESENCE,
+    FUTURE_PRESENCE,
     HOLD,
+    LOSE,
     NO_TARGET,
     OPERATOR,
     PARTITION,
+    RIVAL,
     STUCK_DRIVE,
     SWITCH,
     WATCHDOG,
@@ -44,11 +50,15 @@ from tests.promises.history import (
     last_sent,
     running,
 )
+from tests.promises.lateness import REDISCOVERY
 from tests.promises.marks import STEP
 
 FAIL_SAFES = ("F1", "F2", "F3")
+REPEATED, FUTURE, VETO = "turn_off repeated", "presence from the future", "two controllers"
+CLAIMS = (*FAIL_SAFES, REPEATED, FUTURE, VETO)
 SHARE = 0.8  # of the silences that are long enough
 HELD = 7.0  # s for which the operator holds the switch before
+LONGEST_HOLD = 2.0  # s before a release, from which on messages are held
 PREPARED = 6.0  # s before a release, from which on the fail-safes are unharmed
 RECOVERY = 5.0  # s after a fault
 CRITICAL = (WATCHDOG, CONTROLLER, SWITCH, OPERATOR, ALL, NO_TARGET)
@@ -63,8 +73,9 @@ def judged(given: Reaction) -> float:
 def attacked(experiment: Experiment) -> Experiment:
     """Return an experiment in which most of the long silences are attacked, each fail-safe in turn."""
     rng = random.Random(f"attacks {experiment.seed}")
-    turns = itertools.islice(itertools.cycle(FAIL_SAFES), rng.randrange(len(FAIL_SAFES)), None)
     given = parameter_file.reaction_to(experiment.parameters, "/")
+    able = [claim for claim in CLAIMS if _can_stand_alone(claim, given)]
+    turns = itertools.islice(itertools.cycle(able), rng.randrange(len(able)), None)
     until = judged(given)
     releases = [each for each in _releases(experiment, until) if rng.random() < SHARE]
     commands = [*experiment.scenario["engines"]]
@@ -72,20 +83,34 @@ def attacked(experiment: Experiment) -> Experiment:
     faults = [
         each for each in experiment.faults if not any(_harms(each, release, until) for release in releases)
     ]
-    for release, fail_safe in zip(releases, turns, strict=False):
-        faults += attack(fail_safe, release, given, rng)
+    for release, claim in zip(releases, turns, strict=False):
+        faults += attack(claim, release, given, rng)
     scenario = {**experiment.scenario, "engines": sorted(commands, key=lambda each: float(each["at"]))}
     return replace(experiment, scenario=scenario, faults=sorted(faults))
 
 
-def attack(fail_safe: str, release: float, given: Reaction, rng: random.Random) -> list[PlannedFault]:
-    """Return the faults that leave a fail-safe alone during the silence after a release [s]."""
+def attack(claim: str, release: float, given: Reaction, rng: random.Random) -> list[PlannedFault]:
+    """Return the faults that leave a claim alone during the silence after a release [s]."""
     # The watchdog loses the strikes of earlier silences, so F1 does not act early.
     without_strikes = PlannedFault(-rng.uniform(4.0, 5.0), "kill", WATCHDOG)
     return [
         PlannedFault(round(release + at, 3), kind, target, round(duration, 3))
-        for at, kind, target, duration in (without_strikes, *_ATTACKS[fail_safe](given, rng))
+        for at, kind, target, duration in (without_strikes, *_ATTACKS[claim](given, rng))
     ]
+
+
+def _can_stand_alone(claim: str, given: Reaction) -> bool:
+    """Return whether a claim alone stops the engines within the bound of S1, by the parameters."""
+    if claim == "F1":
+        return given.by_strikes_in_time
+    if claim == REPEATED:
+        return _first_command(given) + given.watchdog.repeat + 0.2 < given.off_within
+    return True
+
+
+def _first_command(given: Reaction) -> float:
+    """Return how long after a release the watchdog has commanded `turn_off` at the latest [s]."""
+    return given.watchdog.strikes * given.watchdog.silence + given.watchdog.sampling + BEAT
 
 
 def _releases(experiment: Experiment, least: float) -> Iterator[float]:
@@ -111,6 +136,25 @@ def _only_watchdog(given: Reaction, rng: random.Random) -> Iterator[PlannedFault
     else:  # not both: of what arrives together, the newest is read, which may be nonsense
         yield _nonsense(given)
     yield from _disturbances(given, rng)
+
+
+def _only_repetition(given: Reaction, rng: random.Random) -> Iterator[PlannedFault]:
+    """Leave F1 alone, and lose its first commands."""
+    yield PlannedFault(0.0, FALSE_PRESENCE, NO_TARGET, judged(given))
+    yield PlannedFault(0.0, STUCK_DRIVE, NO_TARGET, judged(given))
+    yield PlannedFault(0.0, LOSE, topics.ENGINES.name, _first_command(given) + 0.1)
+
+
+def _only_present(given: Reaction, rng: random.Random) -> Iterator[PlannedFault]:
+    """Leave F2 alone, with presences that are a little ahead of their time."""
+    yield _without_watchdog(given, rng)
+    yield PlannedFault(0.0, STUCK_DRIVE, NO_TARGET, judged(given))
+    yield PlannedFault(0.0, FUTURE_PRESENCE, NO_TARGET, judged(given))
+
+
+def _only_veto(given: Reaction, rng: random.Random) -> Iterator[PlannedFault]:
+    """Start a second controller with the engines off, which contradicts the first one."""
+    yield PlannedFault(-rng.uniform(0.5, 0.9), RIVAL, NO_TARGET, judged(given))
 
 
 def _only_controller(given: Reaction, rng: random.Random) -> Iterator[PlannedFault]:
@@ -140,11 +184,18 @@ def _only_drive(given: Reaction, rng: random.Random) -> Iterator[PlannedFault]:
     yield from _disturbances(given, rng)
 
 
-_ATTACKS = dict(zip(FAIL_SAFES, (_only_watchdog, _only_controller, _only_drive), strict=True))
+_ATTACKS = {
+    "F1": _only_watchdog,
+    "F2": _only_controller,
+    "F3": _only_drive,
+    REPEATED: _only_repetition,
+    FUTURE: _only_present,
+    VETO: _only_veto,
+}
 
 
 def _without_watchdog(given: Reaction, rng: random.Random) -> PlannedFault:
-    """Let the watchdog lose its strikes so late that new ones come too late."""
+    """Make the watchdog lose its strikes so late that new ones come too late."""
     kind = rng.choice(("kill", "terminate", "raise", "stop", "hang"))
     duration = {"stop": 4.0, "hang": 15.0}.get(kind, 0.0)
     watchdog = given.watchdog
@@ -153,8 +204,11 @@ def _without_watchdog(given: Reaction, rng: random.Random) -> PlannedFault:
 
 
 def _held(topic: topics.Topic, given: Reaction, until: float) -> PlannedFault:
-    """Hold the last messages before the release until so long after it [s]."""
-    before = 0.6 * given.watchdog.lifespan
+    """Hold the last messages before the release until so long after it [s].
+
+    The watchdog, which was killed, hears some before: it has to see the operator until the release.
+    """
+    before = min(0.6 * given.watchdog.lifespan, LONGEST_HOLD)
     return PlannedFault(-before, HOLD, topic.name, before + until)
 
 
@@ -171,7 +225,10 @@ def _disturbances(given: Reaction, rng: random.Random) -> Iterator[PlannedFault]
 
 
 def alone(history: History) -> Counter[str]:
-    """Return how often each fail-safe turned the engines off late in a silence while the others could not."""
+    """Return how often each fail-safe turned the engines off late in a silence while the others could not.
+
+    And how often a repeated `turn_off` did, F2 against presences from the future, and another controller.
+    """
     counted: Counter[str] = Counter()
     given = history.reaction.watchdog
     on = list(running(history))
@@ -191,12 +248,18 @@ def alone(history: History) -> Counter[str]:
             any(_is_active(fault, kind, last) for fault in history.faults)
             for kind in (STUCK_DRIVE, FALSE_PRESENCE)
         )
+        lost = [each for each in history.faults if each.kind == LOSE and begin < each.end < last + BEAT]
         if is_off and is_commanded and is_stuck and is_deceived:
-            counted["F1"] += 1
+            counted[REPEATED if lost else "F1"] += 1
         elif is_off and not is_commanded and is_stuck:
-            counted["F2"] += 1
+            foretold = any(_is_active(fault, FUTURE_PRESENCE, last) for fault in history.faults)
+            counted[FUTURE if foretold else "F2"] += 1
         elif not is_off and not is_commanded:
             counted["F3"] += 1
+    for fault in history.faults:
+        if fault.kind == RIVAL:
+            said = [each.value for each in between(states, fault.begin, fault.end)]
+            counted[VETO] += sum(pair == (topics.ON, topics.OFF) for pair in itertools.pairwise(said)) > 3
     return counted
 
 

@@ -13,6 +13,7 @@ import statistics
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,7 +24,8 @@ from rclpy.serialization import deserialize_message
 from rclpy_simulation import Delay
 
 from deploy.supervision.errors import DeploymentError
-from tests.promises import observations
+from interfaces import topics
+from tests.promises import lateness, observations
 from tests.promises.findings import percentile
 from tests.promises.history import SOURCES, History, Life
 from tests.promises.promises import CHECKERS
@@ -56,10 +58,9 @@ def measure(path: Path) -> Calibration:
     history = observations.load(path)
     created = _created(path, history)
     silences = [time for times in CHECKERS["L1"](history).times.values() for time in times]
-    samples = [each for samples in history.streams.values() for each in samples]
     return Calibration(
         _delay([created[life] - life.began for life in created]),
-        _delay([each.received - each.sent for each in samples]),
+        _delay(latencies(history)),
         _delay(list(_first_receptions(created, history))),
         {
             "S1": round(CHECKERS["S1"](history).worst, 3),
@@ -70,6 +71,15 @@ def measure(path: Path) -> Calibration:
     )
 
 
+def latencies(history: History) -> list[float]:
+    """Return how long messages took [s]; heartbeats waited until the recorder looked for them."""
+    prompt = {
+        name: stream for name, stream in history.streams.items() if name != topics.OPERATOR_HEARTBEAT.name
+    }
+    known = lateness.from_known_publishers(replace(history, streams=prompt))
+    return [each.received - each.sent for each in known]
+
+
 def _delay(values: Sequence[float]) -> Delay:
     if not values:
         raise DeploymentError("the record is too short for a calibration")
@@ -78,7 +88,7 @@ def _delay(values: Sequence[float]) -> Delay:
 
 def _created(path: Path, history: History) -> dict[Life, float]:
     """Return when the node of each restarted process was created, from its first health report."""
-    begin = min((fault.begin for fault in history.injected), default=0.0)  # until then, all start together
+    begin = min((fault.begin for fault in history.faults), default=0.0)  # until then, all start together
     lives = {(life.program, life.pid): life for life in history.lives if life.program and life.began > begin}
     created: dict[Life, float] = {}
     with McapFile(path) as file:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from interfaces import service
+from interfaces.latch import Event, Latch
 from services import engine_controller
-from services.engine_controller import Event, Latch, Parameters
+from services.engine_controller import Parameters
 
 _step = engine_controller.step
 
 
-def step(latch: Latch, event: Event, given: Parameters, drive_timeout: float) -> Latch:
+def step(latch: Latch, event: Event, parameters: Parameters) -> Latch:
     """Take every presence for one that is still valid an hour later."""
-    return _step(latch, event, Parameters(given.max_presence_age, 3600.0, given.repeat), drive_timeout)
+    return _step(latch, event, replace(parameters, presence_timeout=3600.0))
 
 
 if __name__ == "__main__":

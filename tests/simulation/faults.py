@@ -14,13 +14,28 @@ from interfaces import topics
 from tests.chaos import clock
 from tests.chaos.faults import PARAMETERS, Undo
 from tests.promises import marks
-from tests.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
+from tests.promises.history import (
+    ALL,
+    CONTROLLER,
+    FALSE_PRESENCE,
+    FUTURE_PRESENCE,
+    HOLD,
+    LOSE,
+    NO_TARGET,
+    OPERATOR,
+    PARTITION,
+    RIVAL,
+    STUCK_DRIVE,
+)
 from tests.simulation import people
 from tests.simulation.arm import CONTROL, NAMES, ROBOT, SimulatedArm
 
+RIVAL_PAUSE = 0.22  # s: with it, a repeated `off` still comes within the 400 ms in which it is a veto
 CLOCK_TOLERANCE = 0.045  # s between the clocks of the hosts (deploy/SAFETY.md, A3)
 BAD_LINE = (0.2, Delay(0.05, 0.2))
 """Packet loss and latency of a bad line."""
+STEPS = 40
+"""The most clocks that a process reads, and messages that it publishes and takes, before a pause."""
 HELD = (topics.OPERATOR_HEARTBEAT.name, topics.OPERATOR_PRESENCE.name)
 """The topics whose messages may be held."""
 
@@ -51,6 +66,20 @@ def _stop(arm: SimulatedArm, program: str, duration: float) -> Undo | None:
     return arm.nested.begin(("stop", process), process.proceed)
 
 
+def _pause(arm: SimulatedArm, program: str, duration: float) -> Undo | None:
+    """Stop a process inside a callback: between two readings of a clock, or before it publishes or takes."""
+    process = arm.process(program)
+    if process is None:
+        return None
+    process.stop_after(arm.simulation.random.randint(1, STEPS))
+
+    def proceed() -> None:
+        process.stop_after(0)
+        process.proceed()
+
+    return arm.nested.begin(("stop", process), proceed)
+
+
 def _fail(error: type[BaseException]) -> Callable[[Process], None]:
     def fail() -> None:
         raise error("injected by the simulation")
@@ -59,7 +88,7 @@ def _fail(error: type[BaseException]) -> Callable[[Process], None]:
 
 
 def _slow(arm: SimulatedArm, program: str, duration: float) -> None:
-    """Let a callback take long; DDS continues meanwhile."""
+    """Make a callback take long; DDS continues meanwhile."""
     if process := arm.process(program):
         process.interrupt(lambda: time.sleep(duration))
 
@@ -107,14 +136,14 @@ def _step_clock(arm: SimulatedArm, target: str, duration: float) -> None:
 
 
 def _skew_clock(arm: SimulatedArm, target: str, duration: float) -> None:
-    """Let the clock of the operator's host be off, within the tolerance of assumption A3."""
+    """Set the clock of the operator's host wrong, within the tolerance of assumption A3."""
     skew = arm.simulation.random.uniform(-CLOCK_TOLERANCE, CLOCK_TOLERANCE)
     arm.simulation.host(CONTROL).step(skew - arm.skew)
     arm.skew = skew
 
 
 def _drift_clock(arm: SimulatedArm, target: str, duration: float) -> Undo:
-    """Let the time of day of both hosts run at another rate."""
+    """Make the time of day of both hosts run at another rate."""
     rate = arm.simulation.random.uniform(-0.01, 0.01)
 
     def drift(rate: float) -> None:
@@ -140,6 +169,24 @@ def _bad_line(arm: SimulatedArm, target: str, duration: float) -> Undo:
     return arm.nested.begin("bad_line", heal)
 
 
+def _lose(arm: SimulatedArm, topic: str, duration: float) -> None:
+    arm.simulation.lose(f"rt/{topic}", duration)
+
+
+def _rival(arm: SimulatedArm, target: str, duration: float) -> Undo:
+    """Start a second controller on another host. It pauses, so that the first one is heard twice in a row."""
+    process = arm.start_elsewhere(CONTROLLER, "rival")
+
+    def pause() -> None:
+        if process.exit_code is None:
+            process.stop()
+            arm.simulation.after(RIVAL_PAUSE, process.proceed)
+            arm.simulation.after(3 * RIVAL_PAUSE, pause)
+
+    arm.simulation.after(3 * RIVAL_PAUSE, pause)
+    return process.kill
+
+
 def _hold(arm: SimulatedArm, topic: str, duration: float) -> None:
     arm.simulation.hold(f"rt/{topic}", duration)
 
@@ -148,6 +195,7 @@ FAULT_KINDS: dict[str, FaultKind] = {
     "kill": FaultKind(_process(lambda it: it.kill()), NAMES),
     "terminate": FaultKind(_process(lambda it: it.send_signal(signal.SIGTERM)), NAMES),
     "stop": FaultKind(_stop, NAMES, (0.2, 15.0)),
+    "pause": FaultKind(_pause, NAMES, (0.2, 3.0)),
     "hang": FaultKind(_process(lambda it: it.hang()), NAMES, (15.0, 15.0)),
     "slow": FaultKind(_slow, NAMES, (0.1, 2.0)),
     "raise": FaultKind(_process(_fail(RuntimeError)), NAMES),
@@ -169,6 +217,9 @@ FAULT_KINDS: dict[str, FaultKind] = {
 ATTACK_KINDS: dict[str, FaultKind] = {
     HOLD: FaultKind(_hold, HELD),
     FALSE_PRESENCE: FaultKind(_stranger(people.pretend), (NO_TARGET,)),
+    LOSE: FaultKind(_lose, (topics.ENGINES.name,)),
+    FUTURE_PRESENCE: FaultKind(_stranger(people.foretell), (NO_TARGET,)),
+    RIVAL: FaultKind(_rival, (NO_TARGET,)),
     STUCK_DRIVE: FaultKind(
         lambda arm, target, duration: None, (NO_TARGET,)
     ),  # the checkers take it from the record

@@ -24,7 +24,6 @@ from deploy.supervision.supervisord import Supervisord
 from interfaces.loopback import loopback_is_up
 from interfaces.seam import replaced
 from interfaces.service import host, unix_sockets
-from interfaces.service import process as service_process
 from interfaces.service.beats import Beats, beat
 from interfaces.sources import scenario_file
 
@@ -38,9 +37,8 @@ def simulated_services(
     :param supervisors: returns the present ones.
     :param epoch: the time of day at the beginning [ns since 1970].
     """
-    variables = [(vars(service_process), "_end_of_spin")]
     with (
-        Simulation(seed, network, epoch=epoch, variables=variables) as simulation,
+        Simulation(seed, network, epoch=epoch) as simulation,
         replaced(Machine(simulation, supervisors).answers()),
     ):
         yield simulation

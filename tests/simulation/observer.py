@@ -9,7 +9,7 @@ from typing import Any
 from rclpy_simulation import Simulation
 
 from interfaces import topics
-from tests.promises.history import History, InjectedFault, Life, Sample
+from tests.promises.history import Condition, History, InjectedFault, Life, Sample
 from tests.promises.marks import is_babble
 from tests.promises.observations import values
 
@@ -52,9 +52,14 @@ class Observer:
         return self._digest.hexdigest()
 
     def history(
-        self, lives: Sequence[Life], faults: Sequence[InjectedFault], end: float, absent: frozenset[str]
+        self,
+        lives: Sequence[Life],
+        faults: Sequence[InjectedFault],
+        conditions: Sequence[Condition],
+        end: float,
+        programs: Sequence[str],
     ) -> History:
-        """Return what happened until ``end`` [s]; the arm does not have the programs in ``absent``."""
+        """Return what happened until ``end`` [s] to an arm that has these programs."""
         origin = self._origin
         moved = [
             life._replace(
@@ -62,4 +67,6 @@ class Observer:
             )
             for life in lives
         ]
-        return History(end, self._streams, moved, sorted(faults, key=lambda f: f.begin), absent)
+        return History(
+            end, self._streams, moved, sorted(faults, key=lambda f: f.begin), [*conditions], programs
+        )

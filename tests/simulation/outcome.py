@@ -11,10 +11,10 @@ from typing import Any
 from deploy.supervision.errors import DeploymentError
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment
-from tests.promises.findings import Finding
-from tests.promises.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
-from tests.promises.promises import CHECKERS
-from tests.simulation import people
+from tests.promises.findings import Finding, merged
+from tests.promises.history import SILENCE, Condition, History, InjectedFault
+from tests.promises.promises import checked
+from tests.simulation import people, two_hosts
 from tests.simulation.arm import NAMES, ROBOT, SimulatedArm, simulated_arm
 from tests.simulation.attacks import alone
 from tests.simulation.calibration import Calibration
@@ -37,7 +37,7 @@ class Outcome:
     @property
     def injected(self) -> Counter[str]:
         """How often each kind of fault was injected."""
-        return Counter(fault.kind for fault in self.history.injected)
+        return Counter(fault.kind for fault in self.history.faults)
 
     @property
     def alone(self) -> Counter[str]:
@@ -54,6 +54,8 @@ def simulate(experiment: Experiment, durations: Calibration | None = None) -> Ou
     :param durations: of a real arm; by default, those of ``calibration.json``.
     :raises DeploymentError: if the experiment has a fault that cannot be simulated, or a bad scenario.
     """
+    if experiment.second:
+        return _simulate_two_hosts(experiment)
     for planned in experiment.faults:
         if planned.kind not in KINDS or planned.target not in KINDS[planned.kind].targets:
             raise DeploymentError(f"a simulation has no fault {planned.kind} of {planned.target}")
@@ -69,15 +71,22 @@ def simulate(experiment: Experiment, durations: Calibration | None = None) -> Ou
             arm.simulation.run(arm.origin + experiment.length)
             lives = arm.lives()
         conditions = [
-            InjectedFault(SILENCE, OPERATOR, begin, until)
+            Condition(SILENCE, begin, until)
             for begin, until in people.silences(experiment.scenario, experiment.length)
             if until > begin
         ]
-        history = observer.history(
-            lives, [*injected, *conditions], experiment.length, frozenset(PROGRAMS) - set(NAMES)
-        )
-    findings = [check(history) for check in CHECKERS.values()]
+        history = observer.history(lives, injected, conditions, experiment.length, NAMES)
+    findings = [*checked(history)]
     return Outcome(experiment, findings, history, observer.digest, observer.messages)
+
+
+def _simulate_two_hosts(experiment: Experiment) -> Outcome:
+    histories, digest, messages = two_hosts.play(experiment)
+    findings = [two_hosts.judge(history) for history in histories]
+    # The history of a host that shows a violation, for the reports.
+    shown = next((n for n, each in enumerate(findings) if any(it.evidence for it in each)), 0)
+    together = [merged(each) for each in zip(*findings, strict=True)]
+    return Outcome(experiment, together, histories[shown], digest, messages)
 
 
 def _injection(arm: SimulatedArm, planned: PlannedFault, injected: list[InjectedFault]) -> Any:

@@ -39,7 +39,18 @@ def operator(seed: str, length: float, reaction: Reaction) -> dict[str, Any]:
             commands.append({"at": at, "command": topics.TURN_ON})
         now += _away(rng, reaction)
     commands.sort(key=lambda command: float(command["at"]))
-    return {**sources(RATE), "operator": {"pressed": pressed}, "engines": commands}
+    return {**sources(RATE), **_lengths(seed, length), "operator": {"pressed": pressed}, "engines": commands}
+
+
+def _lengths(seed: str, length: float) -> dict[str, Any]:
+    """Return lengths that rarely change, in half of the scenarios: a new reader needs the last ones."""
+    rng = random.Random(f"lengths {seed}")
+    if rng.random() < 0.5:
+        return {}
+    changes = [
+        {"at": float(at), "value": round(rng.uniform(1.5, 2.5), 3)} for at in range(0, int(length) + 1, 45)
+    ]
+    return {"l1": changes, "l2": 3.0}
 
 
 def _hold(rng: random.Random, now: float) -> Iterator[tuple[float, float]]:
@@ -87,3 +98,8 @@ def babble() -> None:
 def pretend() -> None:
     """Run a stranger's program that reports an operator who is not there until it is killed."""
     babbler.run("pretend", PRETENCE_RATE)
+
+
+def foretell() -> None:
+    """Run a stranger's program that reports an operator who is there a little later, until it is killed."""
+    babbler.run("foretell", PRETENCE_RATE)

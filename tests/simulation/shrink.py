@@ -1,44 +1,22 @@
-"""Shrinks a schedule that breaks a promise to the smallest set of faults that still does.
-
-Source: A. Zeller, R. Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002 (ddmin).
-"""
+"""Shrinks a schedule that breaks a promise to the smallest set of faults that still does."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
+
+from rclpy_simulation.faults import minimal
 
 from tests.chaos.schedule_file import Experiment
 from tests.simulation.outcome import Outcome, simulate
 
-T = TypeVar("T")
 MARGIN = 15.0  # s after the first evidence: the checkers need to see what follows
 
 
-def minimal(items: Sequence[T], fails: Callable[[Sequence[T]], bool]) -> Sequence[T]:
-    """Return a part of the items that fails, and no longer does without any one of them."""
-    parts = 2
-    while len(items) >= 2:
-        size = -(-len(items) // parts)
-        chunks = [items[begin : begin + size] for begin in range(0, len(items), size)]
-        rests = [
-            [each for other in chunks if other is not chunk for each in other] for chunk in chunks
-        ]  # of two chunks, each is the other's rest
-        smaller = next((rest for rest in rests if fails(rest)), None)
-        if smaller is not None:
-            items, parts = smaller, max(parts - 1, 2)
-        elif size == 1:
-            break
-        else:
-            parts = min(2 * parts, len(items))
-    return [] if len(items) == 1 and fails([]) else items
-
-
-def shrink(outcome: Outcome, tell: Callable[[int], None] = lambda faults: None) -> Outcome:
+def shrink(outcome: Outcome, report: Callable[[int], None] = lambda faults: None) -> Outcome:
     """Return the outcome of a smaller experiment that breaks the first promise that this one breaks.
 
-    :param tell: receives the number of faults that are left, after each success.
+    :param report: receives the number of faults that are left, after each success.
     """
     promise = outcome.violated()[0]
     best = outcome
@@ -49,7 +27,7 @@ def shrink(outcome: Outcome, tell: Callable[[int], None] = lambda faults: None) 
         if promise not in found.violated():
             return False
         best = found
-        tell(len(experiment.faults))
+        report(len(experiment.faults))
         return True
 
     at = min(

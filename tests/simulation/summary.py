@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from tests.promises.findings import Evidence, Finding, percentile
+from tests.promises.findings import Finding, merged
 from tests.promises.promises import CHECKERS
 from tests.simulation.outcome import Outcome
 
@@ -50,7 +48,7 @@ class Summary:
             self.findings[promise] += findings
 
     def total(self) -> list[Finding]:
-        return [_sum(findings) for findings in self.findings.values() if findings]
+        return [merged(findings) for findings in self.findings.values() if findings]
 
     def violated(self) -> list[str]:
         return [each.promise for each in self.total() if each.evidence]
@@ -61,26 +59,5 @@ class Summary:
 
 
 def _named(finding: Finding, seed: str) -> Finding:
-    evidence = [Evidence(each.time, f"{each.text} ({seed})") for each in finding.evidence]
+    evidence = [each._replace(text=f"{each.text} ({seed})") for each in finding.evidence]
     return replace(finding, evidence=evidence)
-
-
-def _sum(findings: Sequence[Finding]) -> Finding:
-    times: dict[str, list[float]] = {}
-    for finding in findings:
-        for program, values in finding.times.items():
-            times.setdefault(program, []).extend(values)
-    worst = max(findings, key=lambda finding: -math.inf if math.isnan(finding.worst) else finding.worst)
-    every = [time for values in times.values() for time in values]
-    measured = worst.measured if not math.isnan(worst.worst) else ""
-    if worst.promise == "L1" and every:
-        p50, p99 = percentile(every, 50), percentile(every, 99)
-        measured = f"p50 {p50:.2f} s, p99 {p99:.2f} s, at most {max(every):.2f} s"
-    return replace(
-        worst,
-        cases=sum(finding.cases for finding in findings),
-        unknown=sum(finding.unknown for finding in findings),
-        evidence=[each for finding in findings for each in finding.evidence],
-        measured=measured,
-        times=times,
-    )

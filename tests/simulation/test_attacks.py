@@ -11,10 +11,11 @@ from deploy.supervision import parameter_file
 from interfaces import topics
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment
-from tests.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
+from tests.promises.history import CONTROLLER, FALSE_PRESENCE, HOLD, STUCK_DRIVE, WATCHDOG
+from tests.promises.limits import SLOWEST
 from tests.simulation import __main__ as command_line
 from tests.simulation import attacks, people, plan
-from tests.simulation.attacks import FAIL_SAFES, judged
+from tests.simulation.attacks import CLAIMS, FAIL_SAFES, FUTURE, REPEATED, VETO, judged
 from tests.simulation.faults import ATTACK_KINDS, FAULT_KINDS
 from tests.simulation.outcome import Outcome, simulate
 from tests.simulation.summary import Summary
@@ -22,14 +23,17 @@ from tests.simulation.summary import Summary
 from .bugs import BUGS, CASES, PROFILES, QUICK_BUGS, planted
 
 RELEASE = 14.0  # s
-ALONE = {"thesis": {"F1": 6, "F2": 6, "F3": 4}, "quick": {"F1": 4, "F2": 5, "F3": 2}}
+ALONE = {
+    "thesis": {"F1": 6, "F2": 6, "F3": 4, REPEATED: 6, FUTURE: 6, VETO: 6},
+    "quick": {"F1": 4, "F2": 5, "F3": 2, REPEATED: 6, FUTURE: 5, VETO: 5},
+}
 """Of six attacks: sometimes a successor turns off before the fail-safe has to."""
 THESIS = parameter_file.reaction_to({}, "/")
 DAYS = 30  # within which a bug must be found
 
 
-def day(seed: str, fail_safe: str, profile: str = "thesis") -> Experiment:
-    """Return a day in which the controller pauses while it runs, and a fail-safe has to act alone later."""
+def day(seed: str, claim: str, profile: str = "thesis") -> Experiment:
+    """Return a day in which the controller pauses while it runs, and a claim stands alone later."""
     given = parameter_file.reaction_to(PROFILES[profile], "/")
     scenario = {
         **people.sources(people.RATE),
@@ -37,7 +41,7 @@ def day(seed: str, fail_safe: str, profile: str = "thesis") -> Experiment:
         "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 12.5, RELEASE + judged(given))],
     }
     pause = PlannedFault(6.0, "stop", CONTROLLER, 1.5)
-    faults = attacks.attack(fail_safe, RELEASE, given, random.Random(f"{seed} {fail_safe}"))
+    faults = attacks.attack(claim, RELEASE, given, random.Random(f"{seed} {claim}"))
     length = RELEASE + judged(given) + 3.0
     return Experiment(seed, length, scenario, [pause, *faults], PROFILES[profile])
 
@@ -47,31 +51,35 @@ def evidence(outcome: Outcome) -> list[object]:
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-@pytest.mark.parametrize("fail_safe", FAIL_SAFES)
-def test_each_fail_safe_turns_the_engines_off_in_time_alone(fail_safe: str, profile: str) -> None:
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_each_claim_holds_alone(claim: str, profile: str) -> None:
     counted = 0
     for seed in range(6):
-        outcome = simulate(day(str(seed), fail_safe, profile))
+        outcome = simulate(day(str(seed), claim, profile))
         assert evidence(outcome) == []
-        assert set(outcome.alone) <= {fail_safe}
-        counted += outcome.alone[fail_safe]
-    assert counted >= ALONE[profile][fail_safe]
+        if claim != VETO:
+            assert set(outcome.alone) <= {claim}
+        counted += outcome.alone[claim]
+    assert counted >= ALONE[profile][claim]
 
 
 def test_the_report_says_how_often_each_fail_safe_stood_alone() -> None:
     summary = Summary.of(simulate(day("1", "F1")))
     summary.add(Summary.of(simulate(day("1", "F2"))))
     summary.add(Summary.of(simulate(day("2", "F2"))))
-    line = "Fail-safes that turned the engines off alone: F1 once, F2 2 times, F3 0 times"
+    line = (
+        "What stopped the arm alone: F1 once, F2 2 times, F3 0 times, turn_off repeated 0 times, "
+        "presence from the future 0 times, two controllers 0 times"
+    )
     assert line in command_line.report(summary, 1.0).splitlines()
     assert "alone" not in command_line.report(Summary(hours=1.0), 1.0)
 
 
 @pytest.mark.parametrize(("name", "profile"), CASES)
-def test_a_bug_in_one_fail_safe_is_found(name: str, profile: str) -> None:
+def test_a_bug_that_an_attack_shows_is_found(name: str, profile: str) -> None:
     with planted((BUGS | QUICK_BUGS)[name]):
-        for number, fail_safe in zip(range(DAYS), itertools.cycle(FAIL_SAFES), strict=False):
-            if evidence(simulate(day(f"{name} {number}", fail_safe, profile))):
+        for number, claim in zip(range(DAYS), itertools.cycle(CLAIMS), strict=False):
+            if evidence(simulate(day(f"{name} {number}", claim, profile))):
                 return
     pytest.fail(f"{DAYS} attacks have not found that {name}")
 
@@ -105,3 +113,25 @@ def test_random_faults_leave_the_attacked_fail_safe_unharmed() -> None:
         for release, fault in itertools.product(releases, kept):
             is_near = release - 6.0 < fault.at + fault.duration and fault.at < release + judged(THESIS)
             assert fault.target == "velocity" or not is_near
+
+
+def test_watchdog_slower_than_the_bound_of_s1_is_not_attacked_alone() -> None:
+    slow = {"/operator_watchdog": {"ros__parameters": {"silence": 4.0}}}
+    for parameters, alone in (({}, True), (slow, False)):
+        faults = [
+            each
+            for experiment in plan.experiments("1", 1.0, 5.0, list(FAULT_KINDS), parameters)
+            for each in experiment.faults
+        ]
+        assert any(each.kind == STUCK_DRIVE for each in faults)
+        assert any(each.kind == FALSE_PRESENCE for each in faults) is alone
+
+
+def test_watchdog_sees_the_operator_before_its_messages_are_held() -> None:
+    patient = {"/operator_watchdog": {"ros__parameters": {"lifespan": 7.5, "sampling": 1.0, "silence": 5.0}}}
+    given = parameter_file.reaction_to(patient, "/")
+    for seed, fail_safe in itertools.product(range(20), FAIL_SAFES):
+        faults = attacks.attack(fail_safe, RELEASE, given, random.Random(seed))
+        held = [each.at for each in faults if each.kind == HOLD]
+        killed = min(each.at for each in faults if each.target == WATCHDOG)
+        assert all(at > killed + SLOWEST for at in held)

@@ -57,7 +57,7 @@ def test_arm_stands_still_while_the_engines_are_off_and_then_goes_on() -> None:
 
 def latest(samples: list[Sample], time: float) -> list[float]:
     index = bisect_right(samples, time, key=lambda s: s.sent)
-    return [sample.value for sample in samples[max(0, index - 2) : index]]
+    return [sample.value[0] for sample in samples[max(0, index - 2) : index]]
 
 
 @pytest.mark.parametrize("killed", ["", *KILLED])
@@ -65,7 +65,7 @@ def test_joints_agree_on_the_time_and_never_jump(killed: str) -> None:
     outcome = played(killed)
     times = outcome.history.stream(topics.DRIVEN_TIME)
 
-    assert all(0.0 <= two.value - one.value <= 2 * PERIOD + 1e-6 for one, two in pairwise(times))
+    assert all(0.0 <= two.value[0] - one.value[0] <= 2 * PERIOD + 1e-6 for one, two in pairwise(times))
     for joint in topics.JOINTS:
         track = DEMO.configuration[joint.name]
         for sample in outcome.history.stream(joint):
@@ -76,7 +76,7 @@ def test_joints_agree_on_the_time_and_never_jump(killed: str) -> None:
 @pytest.mark.parametrize("killed", KILLED)
 def test_kill_of_drive_or_joint_costs_less_than_a_second_of_motion(killed: str) -> None:
     undisturbed, disturbed = (
-        played(each).history.stream(topics.DRIVEN_TIME)[-1].value for each in ("", killed)
+        played(each).history.stream(topics.DRIVEN_TIME)[-1].value[0] for each in ("", killed)
     )
 
     # Each time, the joints begin to move with the first repetition of `on` that no `off` opposes any more.

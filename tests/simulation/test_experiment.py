@@ -23,8 +23,9 @@ from tests.chaos import schedule
 from tests.chaos.schedule import AWAKE, DAY, PlannedFault
 from tests.chaos.schedule_file import Experiment
 from tests.chaos.testbed import SCENARIO, sources
-from tests.promises.history import ALL, NO_TARGET, OPERATOR
+from tests.promises.history import ALL, NO_TARGET, OPERATOR, SWITCH
 from tests.simulation import arm, people, plan
+from tests.simulation.bugs import Bug, planted
 from tests.simulation.faults import BAD_LINE, FAULT_KINDS
 from tests.simulation.outcome import Outcome, simulate
 
@@ -102,6 +103,21 @@ def test_equal_experiments_give_equal_records_in_any_interpreter() -> None:
     assert digests[0] == digests[1]
 
 
+def test_one_worker_or_two_give_equal_records() -> None:
+    program = (
+        "import os; from tests.simulation import plan; from tests.simulation.workers import summaries; "
+        "os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:{number}]); "
+        "every = [plan.experiment(str(seed), 16.0, 1.0, list(plan.FAULT_KINDS)) for seed in range(2)]; "
+        "print([each.digest for each in summaries(every)])"
+    )
+    runs = [
+        subprocess.run([sys.executable, "-c", program.format(number=number)], cwd=ROOT, capture_output=True)
+        for number in (1, 2)
+    ]
+    assert runs[0].stdout.count(b"'") == 4
+    assert runs[0].stdout == runs[1].stdout
+
+
 def test_another_seed_gives_another_record() -> None:
     one, two = (simulate(Experiment(seed, 2.0, SCENARIO, [])) for seed in ("one", "two"))
     assert one.digest != two.digest
@@ -132,10 +148,17 @@ def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) 
     assert "S1" in violations(simulate(Experiment("bug", ASLEEP + 12.0, BRIEF, kills)))
 
 
+def test_a_switch_that_never_lets_go_violates_s1() -> None:
+    right = "pressed.instead_of(player.state(scenario.pressed))"
+    with planted(Bug(SWITCH, right, f"{right}.filter(bool)")):
+        outcome = simulate(Experiment("held", ASLEEP + 8.0, BRIEF, []))
+    assert list(violations(outcome)) == ["S1"]
+
+
 def test_a_second_instance_that_does_not_refuse_violates_s5(monkeypatch: pytest.MonkeyPatch) -> None:
     double = Experiment("double", 8.0, BRIEF, [PlannedFault(3.0, "double", "kinematics", 4.0)])
     assert "S5" not in violations(simulate(double))
-    monkeypatch.setattr(instance, "claim", lambda node: nullcontext())
+    monkeypatch.setattr(instance, "claim", lambda node, **options: nullcontext())
     assert "S5" in violations(simulate(double))
 
 

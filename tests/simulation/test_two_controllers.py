@@ -63,7 +63,7 @@ def scenario(chance: random.Random) -> dict[str, Any]:
 
 
 def fight(seed: str) -> Fight:
-    """Let two controllers command one drive, while the line between their hosts is cut and heals."""
+    """Run two controllers of one drive, while the line between their hosts is cut and heals."""
     chance = random.Random(f"two controllers {seed}")
     given = load()
     states: dict[str, list[tuple[float, str]]] = defaultdict(list)
@@ -94,7 +94,7 @@ def fight(seed: str) -> Fight:
                 (value,) = values(topics.ENGINES_STATE, sample.data, "/")
                 states[running_process().host.name].append((simulation.now, value))
             elif writer.topic == "rt/driven_time":
-                (value,) = values(topics.DRIVEN_TIME, sample.data, "/")
+                ((value, _),) = values(topics.DRIVEN_TIME, sample.data, "/")
                 times.append((simulation.now, value))
 
         processes: dict[tuple[str, str], Process] = {}

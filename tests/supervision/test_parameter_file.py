@@ -11,7 +11,7 @@ from interfaces.service import UserError
 
 PARAMETERS = {
     "config_theta2": {"value", "follow_scenario"},
-    "dead_mans_switch": {"rate", "pressed"},
+    "dead_mans_switch": {"rate", "pressed", "hand"},
     "kinematics": set(),
     "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
     "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},

@@ -1,0 +1,159 @@
+"""What the report shows of a violation besides its bound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
+from tests.promises.account import account
+from tests.promises.findings import Evidence
+from tests.promises.history import (
+    CONTROLLER,
+    FALSE_PRESENCE,
+    NO_TARGET,
+    STUCK_DRIVE,
+    SWITCH,
+    WATCHDOG,
+    History,
+    InjectedFault,
+    Life,
+    Sample,
+)
+from tests.promises.promises import CHECKERS
+from tests.promises.text_report import text
+
+LIVES = [
+    Life(SWITCH, 11, 0.0, None),
+    Life(CONTROLLER, 12, 0.0, None),
+    Life(WATCHDOG, 13, 0.0, 11.5),
+    Life(WATCHDOG, 14, 12.0, None),
+]
+FAULTS = [
+    InjectedFault("kill", WATCHDOG, 11.5, 11.5, 13),
+    InjectedFault(STUCK_DRIVE, NO_TARGET, 5.0, 30.0),
+]
+
+
+def history(**streams: list[tuple[float, Any]]) -> History:
+    names = {"beats": "operator_heartbeat", "states": "engines/state", "commands": "engines"}
+    samples = {
+        names.get(name, name): [Sample(at, at, it) for at, it in pairs] for name, pairs in streams.items()
+    }
+    return History(40.0, samples, LIVES, FAULTS)
+
+
+STILL_ON = history(
+    beats=[(4.0, True), (5.0, True)],
+    operator_presence=[(4.5, 0.0), (5.0, 0.0)],
+    operator_activity=[(5.0, ALIVE), (8.0, MISSED), (11.0, MISSED), (15.0, MISSED), (18.0, MISSED)],
+    states=[*((n / 10, ON) for n in range(41, 210)), (21.0, OFF)],
+    commands=[(21.0, TURN_OFF)],
+)
+
+
+def test_report_on_engines_that_stay_on_says_who_had_to_act() -> None:
+    found = CHECKERS["S1"](STILL_ON)
+    (late, *_) = (each for each in found.evidence if "still on" in each.text)
+    assert account(STILL_ON, "S1", late) == [
+        "dead_mans_switch (11) sent its last heartbeat at 5.00 s",
+        "the successor of operator_watchdog since 12.00 s counted 1 of 3 strikes until 15.45 s, at 15.0 s, "
+        "the last one was due at 21.00 s; turn_off came at 21.00 s",
+        "engine_controller (12) sent its last on at 20.90 s, the drive kept it (injected); "
+        "the last presence had come at 5.00 s",
+        "injected: kill of operator_watchdog at 11.50 s, stuck_drive of (no target) at 5.00 s",
+    ]
+    shown = text([found], STILL_ON).splitlines()
+    assert "    dead_mans_switch (11) sent its last heartbeat at 5.00 s" in shown
+
+
+@pytest.mark.parametrize(
+    ("late", "words"),
+    [
+        ([], "never incapacitated; turn_off came at 21.00 s"),
+        ([(14.0, INCAPACITATED)], "incapacitated at 14.0 s; turn_off came at 21.00 s"),
+        (
+            [(20.9, MISSED), (20.9, INCAPACITATED)],
+            "incapacitated at 20.9 s; turn_off came at 21.00 s, after strike 4 at 20.9 s",
+        ),
+    ],
+)
+def test_report_names_what_the_watchdog_concluded_late_and_a_stranger(
+    late: list[tuple[float, str]], words: str
+) -> None:
+    activity = [(7.0, ALIVE), (8.0, MISSED), (11.0, MISSED), (14.0, MISSED), *late]
+    slow = replace(
+        STILL_ON,
+        lives=LIVES[:3],
+        faults=[InjectedFault(FALSE_PRESENCE, NO_TARGET, 5.0, 30.0)],
+        streams={**STILL_ON.streams, "operator_activity": [Sample(at, at, it) for at, it in activity]},
+    )
+    _, watchdog, controller, *_ = account(slow, "S1", Evidence(15.45, "engines still on"))
+
+    strikes = (
+        "operator_watchdog (13) saw the operator until 7.00 s, "
+        "and counted 3 of 3 strikes until 15.45 s, at 8.0, 11.0, 14.0 s"
+    )
+    assert watchdog == f"{strikes}, {words}"
+    assert controller.endswith("had come at 5.00 s, and a stranger sent others (injected)")
+
+
+def test_report_on_another_promise_tells_what_was_said_last() -> None:
+    evidence = Evidence(13.0, "operator_watchdog is silent for 4.00 s after SIGKILL")
+    assert account(STILL_ON, "L1", evidence) == [
+        "operator_watchdog (14), the successor since 12.00 s, was heard last at 5.00 s, never again",
+        "last messages before: operator_heartbeat at 5.00 s, operator_presence at 5.00 s, "
+        "engines/state on at 13.00 s",
+        "injected: kill of operator_watchdog at 11.50 s, stuck_drive of (no target) at 5.00 s",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "program"),
+    [
+        ("the position does not follow from the last values after slow of config_l1", "kinematics"),
+        ("kinematics is silent for 0.27 s when config_l1 is killed", "kinematics"),
+        ("config_l1 is silent for 10 s after slow", "config_l1"),
+        ("no published values give (1.0, 2.0)", "kinematics"),
+        ("speed -1.0", "velocity"),
+        ("the driven time goes back by 1.50 s", "drive"),
+        ("theta1 jumped: 0.79 rad in 0.46 s", "config_theta1"),
+        ("engines turned on without a turn_on in the last 1 s", "engine_controller"),
+    ],
+)
+def test_report_tells_of_the_program_that_a_violation_is_about(text: str, program: str) -> None:
+    assert account(History(40.0), "L3", Evidence(13.0, text))[0].startswith(f"{program} was heard")
+
+
+def test_report_on_silence_shows_the_next_message_and_what_the_health_said() -> None:
+    said = "effector/speed: it is negative"
+    silent = history(
+        **{"effector/speed": [(12.0, 1.0), (13.0, 1.0), (13.4, 1.0)]},
+        **{"/diagnostics": [(13.3, ("velocity", 7, ("said", said)))]},
+    )
+    lines = account(silent, "L2", Evidence(13.0, "velocity is silent for 0.40 s when drive is killed"))
+    assert lines[0] == f"velocity was heard last at 13.00 s, again at 13.40 s; its health said: {said}"
+
+
+def test_report_on_a_position_shows_the_values_that_it_follows_from() -> None:
+    moved = history(
+        l1=[(1.0, 2.0)], theta1=[(2.0, 0.5), (12.0, 0.7)], **{"effector/position": [(11.0, (1.0, 2.0))]}
+    )
+    evidence = Evidence(13.0, "the position does not follow from the last values after slow of config_l1")
+    assert account(moved, "L3", evidence)[1] == (
+        "last values before: effector/position (1.0, 2.0) at 11.00 s, l1 2.0 at 1.00 s, theta1 0.7 at 12.00 s"
+    )
+
+
+def test_run_that_exercised_too_little_has_no_moment_to_tell_of() -> None:
+    assert account(STILL_ON, "S6", Evidence(40.0, "the run exercised it 0 times, and planned 5 cases")) == []
+
+
+def test_report_on_nothing_has_no_gap() -> None:
+    bare = History(40.0)
+    for promise in CHECKERS:
+        lines = account(bare, promise, Evidence(13.0, "?"))
+        assert 2 <= len(lines) <= 5
+        assert lines[-1] == "nothing was injected"
