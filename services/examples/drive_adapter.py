@@ -1,4 +1,4 @@
-"""Turns a real drive on and off: by a service (std_srvs/SetBool), by a file such as a GPIO's, or by both.
+"""Turns a real drive on and off: by a service (std_srvs/SetBool), by a file, or by both.
 
 User story (ours): as a robot operator, I find the drive off unless the engine controller has said `on` within
 the last 400 ms: also when this process starts, when it ends, and when an order to the drive fails.
@@ -8,7 +8,6 @@ when the repetition ends is safe even while this process is killed or stopped; a
 supervisord has started the process again.
 """
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -18,10 +17,12 @@ from reactivex import Observable
 from std_srvs.srv import SetBool
 
 from interfaces import permission, service
+from interfaces.drive_file import DriveFile
 from interfaces.service import Rejected, ServiceNode, UserError, parameter
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE
 
 REPEAT = 0.1  # s
+REMIND = 0.5  # s: each report of health has the reason why the drive stays off
 Order = Callable[[bool], Observable[Any]]
 """Orders a drive on or off; emits an item when it has obeyed, and ends in an error if it has not."""
 
@@ -41,30 +42,28 @@ def orders(permissions: Observable[bool], order: Order) -> Observable[bool | Rej
 
     off = repeated(order(False).map(lambda _: False).catch(rejected))
     on = repeated(order(True).map(lambda _: True))
-    safe = on.catch(lambda error, _: rx.merge(rejected(error), off))
+
+    def stay_off(error: Exception, _: Any) -> Observable[Any]:
+        return rx.merge(rx.timer(0.0, REMIND).flat_map(lambda _: rejected(error)), off)
+
+    safe = on.catch(stay_off)
     return permissions.distinct_until_changed().switch_map(lambda permitted: safe if permitted else off)
 
 
 @dataclass(frozen=True)
 class Parameters:
     service: str = parameter("", None, "", "name of the driver's service; empty for none")
-    file: str = parameter("", None, "", "file that gets `1` or `0`; empty for none")
+    file: str = parameter("", None, "", "file, serial line or pipe that gets `1` or `0`; empty for none")
 
 
 def wire(node: ServiceNode) -> None:
-    given = node.declare(Parameters)
-    if not given.service and not given.file:
+    parameters = node.declare(Parameters)
+    if not parameters.service and not parameters.file:
         raise UserError("no drive: set the parameter service or file")
-    if given.file and not os.access(given.file, os.W_OK):
-        raise UserError(f"file: {given.file} does not exist or cannot be written")
-
-    def write(on: bool) -> None:
-        with open(given.file, "r+", encoding="ascii") as file:
-            file.write(f"{on:d}\n")
 
     def report(item: bool | Rejected) -> None:
         if isinstance(item, Rejected):
-            node.health.drop(item.topic.name, item.reason)
+            node.reject(item)
         else:
             node.health.count_output()
 
@@ -72,17 +71,22 @@ def wire(node: ServiceNode) -> None:
         permissions = permission.observe(node).finally_action(turn_off)  # the end of the node ends them
         orders(permissions, order).subscribe(report, node.fail, scheduler=node.scheduler)
 
-    if given.file:
-        write(False)  # at once: a signal may end this process before the recipe does so
-        connect(lambda on: rx.from_callable(lambda: write(on)), lambda: write(False))
-    if given.service:
-        call = node.create_call(SetBool, given.service, timeout=DRIVE_TIMEOUT)
-        client = node.create_client(SetBool, given.service)
+    if parameters.file:
+        file = DriveFile(parameters.file)
+        file.write(False)  # at once: a signal may end this process before the recipe does so
+        connect(lambda on: rx.from_callable(lambda: file.write(on)), file.leave)
+    if parameters.service:
+        call = node.create_call(SetBool, parameters.service, timeout=DRIVE_TIMEOUT)
+        client = node.create_client(SetBool, parameters.service)
 
         def ask(on: bool) -> Observable[Any]:
-            refused = RuntimeError(f"{given.service} refused {'on' if on else 'off'}")
-            answers = call(SetBool.Request(data=on))
-            return answers.flat_map(lambda it: rx.just(it) if it.success else rx.throw(refused))
+            def obeyed(answer: Any) -> Any:
+                if not answer.success:
+                    why = f": {answer.message}" if answer.message else ""
+                    raise RuntimeError(f"{parameters.service} refused {'on' if on else 'off'}{why}")
+                return answer
+
+            return call(SetBool.Request(data=on)).map(obeyed)
 
         def turn_off() -> None:
             client.call_async(SetBool.Request(data=False))  # a call would wait for the answer

@@ -2,9 +2,9 @@
 
 User story (ours): as an operator of a mobile robot, I drive it only while I hold the switch.
 
-Commands come on `cmd_vel_in`, the robot listens to `cmd_vel`. The last message of this process is zero. A
-robot that stops when `cmd_vel` falls silent stops in time even if this process is killed; another one waits
-until supervisord has started the process again.
+Commands come on `cmd_vel_in`, the robot listens to `cmd_vel`. Zero follows when no command has come for
+0.5 s, and the last message of this process is zero. A robot that stops when `cmd_vel` falls silent stops in
+time even if this process is killed; another one waits until supervisord has started the process again.
 """
 
 import math
@@ -38,20 +38,26 @@ COMMANDS = topics.Topic(
     raw=True,
 )
 REPEAT = 0.1  # s: the zero is repeated, so that a base that starts later gets it
+SILENCE = 0.5  # s without a command: then the last one is over, as for the base of ros2_controllers
 
 
 def gated(commands: Observable[Any], permissions: Observable[bool], zero: Any) -> Observable[Any]:
     """Emit the commands while they are permitted, and ``zero`` otherwise, at once and repeatedly.
 
-    It ends with the permissions, and its last item is ``zero``.
+    ``zero`` comes as well when no command has come for 0.5 s. It ends with the permissions, and its last item
+    is ``zero``.
     """
 
     def velocities(permissions: Observable[bool]) -> Observable[Any]:
         passing = (
             commands.with_latest_from(permissions).filter(lambda pair: pair[1]).map(lambda pair: pair[0])
         )
-        zeros = rx.timer(0.0, REPEAT).map(lambda _: zero)
-        standing = permissions.switch_map(lambda permitted: rx.never() if permitted else zeros)
+        waits = permissions.switch_map(
+            lambda permitted: (
+                commands.map(lambda _: SILENCE).start_with(SILENCE) if permitted else rx.just(0.0)
+            )
+        )
+        standing = waits.switch_map(lambda wait: rx.timer(wait, REPEAT)).map(lambda _: zero)
         last = permissions.ignore_elements().default_if_empty(zero)
         return rx.merge(passing.take_until(last), standing.take_until(last), last)
 

@@ -1,25 +1,27 @@
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import reactivex as rx
+from rclpy.task import Future
 from reactivex import Observable
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from interfaces.service import Rejected, UserError
-from interfaces.topics import ENGINES_STATE, OFF, ON
+from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE, OFF, ON
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
 from services.examples import drive_adapter
 from services.examples.drive_adapter import orders
-from tests.component.wiring import Wired
+from tests.component.wiring import Connect, Wired
 
 
 class Drive:
-    """A drive that needs some time [s] to obey, and refuses what it is told to refuse."""
+    """A drive that needs some time [s] to obey, and refuses what it shall refuse."""
 
     def __init__(self, delay: float = 0.0, refuses: Callable[[bool], bool] = lambda on: False) -> None:
         self.ordered: list[bool] = []
@@ -29,7 +31,9 @@ class Drive:
     def order(self, on: bool) -> Observable[None]:
         def begin(_: Any) -> Observable[Any]:
             self.ordered.append(on)
-            return rx.throw(RuntimeError("it is stuck")) if self._refuses(on) else rx.timer(self._delay)
+            if self._refuses(on):
+                return rx.throw(RuntimeError("it is stuck"))
+            return rx.timer(self._delay).map(lambda _: "an answer")
 
         return rx.defer(begin)
 
@@ -60,12 +64,20 @@ def test_off_does_not_wait_for_the_answer_to_an_on() -> None:
 def test_drive_that_fails_to_go_on_is_off_until_it_is_permitted_again() -> None:
     ons = iter([True, False, False])
     drive = Drive(refuses=lambda on: on and next(ons))
-    found = obeyed(drive, (0.05, True), (0.45, False), (0.55, True), until=0.7)
+    found = obeyed(drive, (0.05, True), (0.25, True), (0.45, False), (0.55, True), until=0.7)
     reason = "the drive does not obey: it is stuck"
     states = [it for _, it in found]
     assert states[:2] == [False, reason]
     assert set(states[2:-2]) == {False}
     assert states[-2:] == [True, True]
+
+
+def test_reason_is_reported_while_the_drive_stays_off() -> None:
+    drive = Drive(refuses=bool)
+    found = obeyed(drive, (0.05, True), (1.3, False), until=1.9)
+    reason = "the drive does not obey: it is stuck"
+    assert [round(at, 1) for at, it in found if it == reason] == [0.1, 0.6, 1.1]
+    assert sum(it is False for at, it in found if at < 1.3) > 10  # and it is ordered off meanwhile
 
 
 def test_off_that_fails_is_tried_again() -> None:
@@ -75,18 +87,18 @@ def test_off_that_fails_is_tried_again() -> None:
     assert found == [(0.0, reason), (0.1, reason), (0.2, False)]
 
 
-def start(make_node: MakeNode, spin_until: SpinUntil, **parameters: Any) -> Wired:
-    wired = Wired(make_node, spin_until, drive_adapter.wire, inputs=[ENGINES_STATE], outputs=[], **parameters)
+def start(connect: Connect, **parameters: Any) -> Wired:
+    wired = connect(drive_adapter.wire, inputs=[ENGINES_STATE], **parameters)
     wired.publish(ENGINES_STATE, String(data=OFF))
     return wired
 
 
 def test_file_follows_the_engines_and_is_off_at_the_end(
-    make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path
+    connect: Connect, spin_until: SpinUntil, tmp_path: Path
 ) -> None:
     pin = tmp_path / "value"
     pin.write_text("1\n")
-    wired = start(make_node, spin_until, file=str(pin))
+    wired = start(connect, file=str(pin))
     spin_until(lambda: pin.read_text() == "0\n")
 
     def turned_on() -> bool:
@@ -95,25 +107,23 @@ def test_file_follows_the_engines_and_is_off_at_the_end(
 
     spin_until(turned_on)
     spin_until(lambda: pin.read_text() == "0\n")  # nobody repeats the `on`
+    assert wired.remarks() == []
+    assert int(wired.reports()[-1]["published"]) > 2  # orders
     spin_until(turned_on)
     wired.service.destroy_node()
 
     assert pin.read_text() == "0\n"
 
 
-def test_file_is_off_before_the_service_spins(
-    make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path
-) -> None:
+def test_file_is_off_before_the_service_spins(connect: Connect, tmp_path: Path) -> None:
     pin = tmp_path / "value"
     pin.write_text("1\n")
-    start(make_node, spin_until, file=str(pin))
+    start(connect, file=str(pin))
     assert pin.read_text() == "0\n"
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
-def test_service_follows_the_engines_and_is_off_at_the_end(
-    make_node: MakeNode, spin_until: SpinUntil
-) -> None:
+def obedient_driver(make_node: MakeNode) -> list[bool]:
+    """Serve a drive that does what it is asked for; return what that was."""
     asked: list[bool] = []
 
     def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
@@ -122,7 +132,15 @@ def test_service_follows_the_engines_and_is_off_at_the_end(
         return response
 
     make_node("driver").create_service(SetBool, "motor", answer)
-    wired = start(make_node, spin_until, service="motor")
+    return asked
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
+def test_service_follows_the_engines_and_is_off_at_the_end(
+    connect: Connect, make_node: MakeNode, spin_until: SpinUntil
+) -> None:
+    asked = obedient_driver(make_node)
+    wired = start(connect, service="motor")
     spin_until(lambda: asked[-1:] == [False])
 
     def turned_on() -> bool:
@@ -137,12 +155,99 @@ def test_service_follows_the_engines_and_is_off_at_the_end(
     spin_until(lambda: len(asked) > count and not asked[-1])
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
+def test_file_and_service_follow_the_engines_together(
+    connect: Connect, make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    pin = tmp_path / "value"
+    pin.write_text("1\n")
+    asked = obedient_driver(make_node)
+    wired = start(connect, file=str(pin), service="motor")
+    spin_until(lambda: (asked[-1:], pin.read_text()) == ([False], "0\n"))
+
+    def turned_on() -> bool:
+        wired.publish(ENGINES_STATE, String(data=ON))
+        return (asked[-1], pin.read_text()) == (True, "1\n")
+
+    spin_until(turned_on)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
+@pytest.mark.parametrize(
+    ("order", "message", "words"),
+    [
+        (True, "brake of axis 2 is stuck", "motor refused on: brake of axis 2 is stuck"),
+        (False, "", "motor refused off"),
+    ],
+)
+def test_words_of_a_driver_that_refuses_are_reported(
+    connect: Connect, make_node: MakeNode, spin_until: SpinUntil, order: bool, message: str, words: str
+) -> None:
+    def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        response.success = request.data != order
+        response.message = "" if response.success else message
+        return response
+
+    make_node("driver").create_service(SetBool, "motor", answer)
+    wired = start(connect, service="motor")
+    why = f"engines/state: the drive does not obey: {words}"
+
+    def is_reported() -> bool:
+        wired.publish(ENGINES_STATE, String(data=ON))
+        return why in wired.remarks()
+
+    spin_until(is_reported)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
+def test_drive_that_does_not_answer_is_ordered_off_within_its_timeout(
+    connect: Connect, make_node: MakeNode, spin_until: SpinUntil
+) -> None:
+    asked: list[tuple[bool, float]] = []
+
+    async def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        asked.append((request.data, time.monotonic()))
+        if request.data:
+            await Future()  # for ever
+        response.success = True
+        return response
+
+    make_node("driver").create_service(SetBool, "motor", answer)
+    wired = start(connect, service="motor")
+    why = f"engines/state: the drive does not obey: no response of motor within {DRIVE_TIMEOUT} s"
+
+    def is_reported() -> bool:
+        wired.publish(ENGINES_STATE, String(data=ON))  # it stays permitted
+        return any(why in remark for remark in wired.remarks())
+
+    begin = time.monotonic()
+    spin_until(is_reported)
+    on = next(n for n, (order, _) in enumerate(asked) if order)
+    # On a busy machine, another `on` may take the place of an `off` that was not read yet.
+    spin_until(lambda: any(not order for order, _ in asked[on:]))
+    off = next(at for order, at in asked[on:] if not order)
+    assert off - begin >= DRIVE_TIMEOUT
+
+
+def test_drive_whose_file_has_gone_ends_in_order(
+    connect: Connect, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    pin = tmp_path / "value"
+    pin.write_text("1\n")
+    wired = start(connect, file=str(pin))
+    pin.unlink()
+    gone = f"the drive does not obey: file: {pin} cannot be written: No such file or directory"
+    spin_until(lambda: any(gone in remark for remark in wired.remarks()))
+    wired.service.destroy_node()
+
+
 @pytest.mark.parametrize(
     ("parameters", "problem"),
-    [({}, "no drive: set the parameter service or file"), ({"file": "/no/pin"}, "file: /no/pin does not")],
+    [
+        ({}, "no drive: set the parameter service or file"),
+        ({"file": "/no/pin"}, "file: /no/pin cannot be written: No such file"),
+    ],
 )
-def test_missing_drive_is_refused(
-    make_node: MakeNode, spin_until: SpinUntil, parameters: dict[str, str], problem: str
-) -> None:
-    with pytest.raises(UserError, match=problem):
-        start(make_node, spin_until, **parameters)
+def test_missing_drive_is_refused(connect: Connect, parameters: dict[str, str], problem: str) -> None:
+    with pytest.raises(UserError, match=f"^{problem}"):
+        start(connect, **parameters)

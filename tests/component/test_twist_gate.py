@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import math
+import re
+import time
 from typing import Any
 
 import pytest
@@ -8,11 +10,11 @@ from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
-from interfaces.topics import ENGINES_STATE, ON, Topic
-from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
+from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE, ON, Topic
+from reactive_node.testing import SpinUntil, VirtualTime
 from services.examples import twist_gate
 from services.examples.twist_gate import gated
-from tests.component.wiring import Wired
+from tests.component.wiring import Connect
 
 
 def test_commands_pass_only_while_they_are_permitted(scheduler: VirtualTime) -> None:
@@ -25,6 +27,25 @@ def test_commands_pass_only_while_they_are_permitted(scheduler: VirtualTime) -> 
         (1.05, 5),
         *((round(1.1 + 0.1 * n, 2), "zero") for n in range(4)),
     ]
+
+
+def test_zero_follows_when_commands_stop(scheduler: VirtualTime) -> None:
+    commands = scheduler.hot((0.1, 1), (0.55, 2), (0.9, 3), (1.75, 4))
+    recording = scheduler.record(gated(commands, scheduler.hot((0.05, True)), "zero"), until=2.0)
+    found = [(round(at, 2), it) for at, it in recording.items]
+    zeros = [(round(1.4 + 0.1 * n, 2), "zero") for n in range(4)]
+    assert found == [(0.1, 1), (0.55, 2), (0.9, 3), *zeros, (1.75, 4)]
+
+
+def test_zero_follows_when_no_command_comes_at_all(scheduler: VirtualTime) -> None:
+    recording = scheduler.record(gated(scheduler.hot(), scheduler.hot((0.05, True)), "zero"), until=0.7)
+    assert [(round(at, 2), it) for at, it in recording.items] == [(0.55, "zero"), (0.65, "zero")]
+
+
+def test_permission_that_is_repeated_prolongs_no_command(scheduler: VirtualTime) -> None:
+    permissions = scheduler.hot(*((0.05 + 0.1 * n, True) for n in range(9)))
+    recording = scheduler.record(gated(scheduler.hot((0.1, 1)), permissions, "zero"), until=0.75)
+    assert [(round(at, 2), it) for at, it in recording.items] == [(0.1, 1), (0.6, "zero"), (0.7, "zero")]
 
 
 def test_last_item_is_zero(scheduler: VirtualTime) -> None:
@@ -45,16 +66,11 @@ def topic(kind: Any, name: str, reliability: ReliabilityPolicy = RELIABLE) -> To
     ("kind", "sent"), [(Twist, BEST_EFFORT), (Twist, RELIABLE), (TwistStamped, RELIABLE)]
 )
 def test_robot_stands_still_unless_the_engines_are_on(
-    make_node: MakeNode, spin_until: SpinUntil, kind: Any, sent: ReliabilityPolicy
+    connect: Connect, spin_until: SpinUntil, kind: Any, sent: ReliabilityPolicy
 ) -> None:
     source, sink = topic(kind, "cmd_vel_in", sent), topic(kind, "cmd_vel")
-    wired = Wired(
-        make_node,
-        spin_until,
-        twist_gate.wire,
-        inputs=[source, ENGINES_STATE],
-        outputs=[sink],
-        stamped=kind is TwistStamped,
+    wired = connect(
+        twist_gate.wire, inputs=[source, ENGINES_STATE], outputs=[sink], stamped=kind is TwistStamped
     )
     heard = wired.heard[sink.name]
 
@@ -64,6 +80,8 @@ def test_robot_stands_still_unless_the_engines_are_on(
     def command(speed: float) -> Any:
         message = kind()
         (message.twist if kind is TwistStamped else message).linear.x = speed
+        if kind is TwistStamped:
+            message.header.stamp.sec = 7  # the robot judges its age
         return message
 
     spin_until(lambda: speeds()[-2:] == [0.0, 0.0])
@@ -76,15 +94,40 @@ def test_robot_stands_still_unless_the_engines_are_on(
         return speeds()[-1] == 2.0
 
     spin_until(drives)
+    assert kind is Twist or heard[-1].header.stamp.sec == 7
     spin_until(lambda: speeds()[-1] == 0.0)  # nobody repeats the `on`
     assert {*speeds()} == {0.0, 2.0}
     if kind is TwistStamped:
-        assert heard[-1].header.stamp.sec > 0
+        assert heard[-1].header.stamp.sec > 7
+    (publisher,) = (each for each in wired.service.publishers if each.topic_name == "/cmd_vel")
+    assert publisher.qos_profile.depth == 1  # a robot that reads late gets the newest velocity only
 
 
-def test_command_that_is_no_number_is_dropped(make_node: MakeNode, spin_until: SpinUntil) -> None:
+def test_command_that_is_no_number_is_dropped(connect: Connect, spin_until: SpinUntil) -> None:
     source = topic(Twist, "cmd_vel_in")
-    wired = Wired(make_node, spin_until, twist_gate.wire, inputs=[source], outputs=[topic(Twist, "cmd_vel")])
+    wired = connect(twist_gate.wire, inputs=[source], outputs=[topic(Twist, "cmd_vel")])
     wired.publish(source, Twist(linear=Vector3(x=math.nan)))
     spin_until(lambda: wired.service.health.dropped)
-    assert wired.remarks() == ["cmd_vel_in: [nan, 0.0, 0.0, 0.0, 0.0, 0.0] is not finite"]
+    assert "cmd_vel_in: [nan, 0.0, 0.0, 0.0, 0.0, 0.0] is not finite" in wired.remarks()
+
+
+def test_command_that_waited_while_the_gate_was_stopped_is_dropped(
+    connect: Connect, spin_until: SpinUntil
+) -> None:
+    source, sink = topic(Twist, "cmd_vel_in"), topic(Twist, "cmd_vel")
+    wired = connect(twist_gate.wire, inputs=[source, ENGINES_STATE], outputs=[sink])
+
+    def drives() -> bool:
+        wired.publish(ENGINES_STATE, String(data=ON))
+        wired.publish(source, Twist(linear=Vector3(x=1.0)))
+        return wired.heard[sink.name][-1:] == [Twist(linear=Vector3(x=1.0))]
+
+    spin_until(drives)
+    wired.publish(source, Twist(linear=Vector3(x=2.0)))
+    time.sleep(DRIVE_TIMEOUT + 0.01)  # nothing spins: the gate is stopped
+    wired.publish(ENGINES_STATE, String(data=ON))
+    spin_until(lambda: wired.service.health.dropped)
+
+    (remark,) = wired.remarks()
+    assert re.fullmatch(r"cmd_vel_in: it is 0\.\d+ s old", remark)
+    assert Twist(linear=Vector3(x=2.0)) not in wired.heard[sink.name]
