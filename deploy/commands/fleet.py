@@ -28,7 +28,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from reactivex import Observable
 
 from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
-from deploy.operator.output import say, use_plain_output
+from deploy.operator.output import Area, say, use_plain_output
 from deploy.security.keystore import Keystore
 from deploy.supervision import interruption, processes
 from deploy.supervision.columns import table
@@ -44,14 +44,16 @@ from deploy.supervision.environment import (
     tagged,
 )
 from deploy.supervision.errors import DeploymentError
-from interfaces.service import UserError, enclave
+from interfaces.service import UserError, enclave, middleware
+from interfaces.service.reading import reading, unreported
 from interfaces.topics import DIAGNOSTICS, ENGINES_STATE, FLEET, Topic
 from reactive_node import ReactiveNode
 
 PERIOD = 1.0  # s between two looks at the engines, and between two tables
 FIRST = 2.5  # s until the first table: each service reports its health once a second
+MOST_ENDED = 20  # arms that a table still shows
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-DDS = (RANGE, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", CYCLONEDDS, SECURITY, KEYSTORE)
+DDS = (RANGE, "ROS_STATIC_PEERS", CYCLONEDDS, SECURITY, KEYSTORE)
 """The variables by which this process meets the nodes of an arm."""
 
 
@@ -96,7 +98,7 @@ def _of_this_host(*, secured: bool) -> set[Place]:
     return {place(environment) for environment in systems if is_secured(environment) == secured}
 
 
-def _hidden() -> str:
+def hidden_arms() -> str:
     """Name the arms of this host that this command does not show, and the one that does."""
     secured = not is_secured(os.environ)
     names = ", ".join(sorted(each.namespace for each in _of_this_host(secured=secured)))
@@ -119,7 +121,7 @@ def _places_of(name: str) -> list[Place]:
     return [place(environment | {CYCLONEDDS: tag}) for tag in tags]
 
 
-def _numbers(domains: Iterable[Domain]) -> dict[Domain, int]:
+def numbers_of(domains: Iterable[Domain]) -> dict[Domain, int]:
     """Number the domains within this process: Cyclone DDS compares this number with that of the permissions.
 
     Arms of several tags share a ROS domain: all but the first get a number that is free. Another DDS would
@@ -137,10 +139,10 @@ def _numbers(domains: Iterable[Domain]) -> dict[Domain, int]:
 
 
 @contextmanager
-def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
+def joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
     """Join a domain.
 
-    :param number: of the domain within this process, see :func:`_numbers`.
+    :param number: of the domain within this process, see :func:`numbers_of`.
     """
     outside = f"<Discovery><ExternalDomainId>{domain.number}</ExternalDomainId></Discovery>"
     settings = dict.fromkeys(DDS, "") | dict(domain.variables)
@@ -154,7 +156,10 @@ def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
             Keystore(Path(settings[KEYSTORE])).check([enclave.path(FLEET, "/")], domain.number)
         keys = enclave.arguments(FLEET, "/")
         rclpy.init(
-            args=keys, context=context, domain_id=number, signal_handler_options=SignalHandlerOptions.NO
+            args=[*middleware.WITHOUT_LOG_FILES, *keys],
+            context=context,
+            domain_id=number,
+            signal_handler_options=SignalHandlerOptions.NO,
         )
         node = ReactiveNode(f"{FLEET}_{os.getpid()}", context=context)
     except (DeploymentError, RuntimeError, UserError) as error:
@@ -169,15 +174,15 @@ def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
         rclpy.try_shutdown(context=context)
 
 
-def _nodes(stack: ExitStack, domains: Iterable[Domain]) -> dict[Domain, ReactiveNode]:
-    """Join those domains that let this process join, and tell why another does not.
+def join(stack: ExitStack, domains: Iterable[Domain]) -> dict[Domain, ReactiveNode]:
+    """Join those domains that let this process join, and print why another does not.
 
     :raises DeploymentError: if none does.
     """
     nodes, refusals = {}, []
-    for domain, number in _numbers(domains).items():
+    for domain, number in numbers_of(domains).items():
         try:
-            nodes[domain] = stack.enter_context(_joined(domain, number))
+            nodes[domain] = stack.enter_context(joined(domain, number))
         except DeploymentError as error:
             refusals.append(error)
     if not nodes:
@@ -188,12 +193,10 @@ def _nodes(stack: ExitStack, domains: Iterable[Domain]) -> dict[Domain, Reactive
 
 
 def _observe(node: ReactiveNode, topic: Topic, name: str) -> Observable[Any]:
-    def value(message: Any) -> Any:
-        return topic.value(message)
-
+    options = reading(topic, unreported)  # the services of the arm report the same
     if topic is ENGINES_STATE:  # ten a second are too many to be read
-        return node.create_sampled_observable(topic.type, name, PERIOD, BEST_EFFORT, item=value)
-    return node.create_observable(topic.type, name, topic.qos, item=value)
+        return node.create_sampled_observable(topic.type, name, PERIOD, BEST_EFFORT, **options)
+    return node.create_observable(topic.type, name, topic.qos, **options)
 
 
 def _seen(namespace: str, nodes: Iterable[ReactiveNode], health: Mapping[ReactiveNode, Any]) -> Seen:
@@ -208,7 +211,7 @@ def _seen(namespace: str, nodes: Iterable[ReactiveNode], health: Mapping[Reactiv
     return seen
 
 
-def watch(found: Collection[Place], more: Callable[[], bool]) -> None:
+def watch(found: Collection[Place], more: Callable[[], bool], area: Area) -> None:
     """Show the arms until there are more of them, or the user ends it."""
     arms = {(namespace, domain.number): Arm(namespace, domain.number) for namespace, domain in sorted(found)}
 
@@ -216,7 +219,7 @@ def watch(found: Collection[Place], more: Callable[[], bool]) -> None:
         arms[arm.name, arm.domain] = arm
 
     with ExitStack() as stack:
-        nodes = _nodes(stack, (domain for _, domain in found))
+        nodes = join(stack, (domain for _, domain in found))
         health = {node: _observe(node, DIAGNOSTICS, DIAGNOSTICS.name) for node in nodes.values()}
 
         def arm_of(key: tuple[str, int]) -> Observable[Arm]:
@@ -236,25 +239,28 @@ def watch(found: Collection[Place], more: Callable[[], bool]) -> None:
             due = now + PERIOD
             lines = table([HEADER, *(row(arm, now) for arm in arms.values())])
             if lines != shown:
-                say(("\n" if shown else "") + lines)
+                area.show(lines)
                 shown = lines
 
 
 def run(named: Sequence[str]) -> None:
-    """Watch the arms until the user ends it; an arm that has ended stays in the table.
+    """Watch the arms until the user ends it; arms that ended last stay in the table.
 
     :raises DeploymentError: for a wrong name, or if there is no arm.
     """
-    found: set[Place] = set()
-    if hidden := _hidden():
+    found: dict[Place, None] = {}
+    area = Area()
+    if hidden := hidden_arms():
         say(f"Not shown: {hidden}")
 
     def more() -> bool:
-        return not found >= places(named)
+        return not found.keys() >= places(named)
 
-    while more():
-        found |= places(named)
-        watch(found, more)
+    while found or more():
+        running = places(named)
+        ended = [each for each in found if each not in running]
+        found = dict.fromkeys([*ended[-MOST_ENDED:], *running])
+        watch(found, more, area)
     other = " other" if hidden else ""
     raise DeploymentError(f"No{other} arm runs on this host. ARMS=/arm1 names an arm of another host.")
 

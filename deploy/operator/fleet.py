@@ -14,6 +14,7 @@ from reactivex import Observable
 
 from deploy.supervision.reaction import reaction
 from deploy.supervision.sentinel import reported
+from interfaces.limits import newest
 from interfaces.service import UserError
 from interfaces.service.health import Health, healths, reported_parameters
 from interfaces.topics import ALIVE, DIAGNOSTICS, ENGINES_STATE, OPERATOR_ACTIVITY, Topic
@@ -30,7 +31,7 @@ Clock = Callable[[], float]
 """The monotonic clock [s]."""
 
 
-class Told(NamedTuple):
+class Timestamp(NamedTuple):
     """A value, and when it came [s, monotonic clock]."""
 
     value: str = ""
@@ -42,10 +43,10 @@ class Arm(NamedTuple):
 
     name: str
     domain: int
-    engines: Told = Told()
-    operator: Told = Told()
+    engines: Timestamp = Timestamp()
+    operator: Timestamp = Timestamp()
     healths: Mapping[tuple[str, str], Health] = {}
-    """What was last heard, by host and program."""
+    """The last report, by host and program."""
     states: Mapping[tuple[str, str], str] = {}
     """The state of each process as the sentinel of its host sees it, by host and program."""
     reports: Mapping[str, Any] = {}
@@ -64,10 +65,10 @@ def watched(arm: Arm, seen: Seen, clock: Clock) -> Observable[Arm]:
     """Emit an arm as it is after each of its messages."""
 
     def engines(state: str) -> Change:
-        return lambda arm: arm._replace(engines=Told(state, clock()))
+        return lambda arm: arm._replace(engines=Timestamp(state, clock()))
 
     def operator(activity: str) -> Change:
-        return lambda arm: arm._replace(operator=Told(activity, clock()))
+        return lambda arm: arm._replace(operator=Timestamp(activity, clock()))
 
     changes = rx.merge(
         seen(ENGINES_STATE).map(engines),
@@ -89,9 +90,9 @@ def _health(message: Any) -> Change:
             if status.name == f"{namespace}/{program}"
         }
         return arm._replace(
-            healths={**arm.healths, **{(it.host, program): it for program, it in news.items()}},
-            states={**arm.states, **states},
-            reports={**arm.reports, **reports},
+            healths=newest({**arm.healths, **{(it.host, program): it for program, it in news.items()}}),
+            states=newest({**arm.states, **states}),
+            reports=newest({**arm.reports, **reports}),
         )
 
     return change
@@ -106,7 +107,7 @@ def row(arm: Arm, now: float) -> tuple[str, ...]:
     operator = arm.operator.value
     if operator == ALIVE and now - arm.operator.at >= LONGEST_SILENCE:
         operator = ""
-    hosts = {host for host, _ in _present(arm, now)}
+    hosts = {host for host, _ in present(arm, now)}
     return (
         arm.name,
         str(arm.domain),
@@ -114,24 +115,25 @@ def row(arm: Arm, now: float) -> tuple[str, ...]:
         operator or UNKNOWN,
         engines,
         _in_words(arm, now),
-        _bound(arm),
+        bound(arm),
     )
 
 
-def _bound(arm: Arm) -> str:
+def bound(arm: Arm) -> str:
     """Return how soon the engines stop, if that follows from what the programs report."""
     try:
-        bound = reaction({name: reported_parameters(it) for name, it in arm.reports.items()}).off_within
+        within = reaction({name: reported_parameters(it) for name, it in arm.reports.items()}).off_within
     except (ArithmeticError, TypeError, ValueError, UserError):  # of another version, or not ours
         return UNKNOWN
-    return f"{bound:g} s" if arm.reports and math.isfinite(bound) else UNKNOWN
+    return f"{within:g} s" if arm.reports and math.isfinite(within) else UNKNOWN
 
 
 def _in_words(arm: Arm, now: float) -> str:
-    """Return the health of an arm: how many programs are well, or the first problem."""
-    healths = _present(arm, now)
+    """Return the health of an arm: how many are well, or the first problem; and how many run unheard."""
+    healths = present(arm, now)
     silent = {name for (_, name), health in healths.items() if now - health.heard >= LONGEST_SILENCE}
-    if silent == {name for _, name in healths}:
+    heard = {name for _, name in healths}
+    if silent == heard:
         return SILENT
     problems = {name: health.reason for (_, name), health in healths.items() if not health.ok}
     problems |= dict.fromkeys(silent, SILENT)
@@ -141,14 +143,20 @@ def _in_words(arm: Arm, now: float) -> str:
         for (host, name), state in arm.states.items()
         if host in hosts and state not in ("STARTING", "RUNNING")
     }
+    unheard = [
+        name
+        for (host, name), state in arm.states.items()
+        if host in hosts and state == "RUNNING" and name not in heard
+    ]
+    rest = f", {len(unheard)} unheard" if unheard else ""
     if not problems:
-        return f"{len(healths)} ok"
+        return f"{len(healths)} ok{rest}"
     first = min(problems)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return f"{first}: {problems[first]}{more}"
+    return f"{first}: {problems[first]}{more}{rest}"
 
 
-def _present(arm: Arm, now: float) -> dict[tuple[str, str], Health]:
+def present(arm: Arm, now: float) -> dict[tuple[str, str], Health]:
     """Return the healths without those of silent processes that another host has replaced."""
     old = {process for process, health in arm.healths.items() if now - health.heard >= LONGEST_SILENCE}
     heard = {program for _, program in arm.healths.keys() - old}

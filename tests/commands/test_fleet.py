@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from deploy.commands import fleet
 from deploy.commands.fleet import Domain, Place, places
 from deploy.security import rights
 from deploy.security.keystore import Keystore
-from deploy.supervision import processes
+from deploy.supervision import interruption, processes
 from deploy.supervision.environment import CYCLONEDDS, RANGE, set_middleware
 from deploy.supervision.errors import DeploymentError
 from reactive_node.domains import reserved_domain
@@ -45,7 +45,7 @@ def test_processes_of_one_arm_meet_and_those_of_another_do_not(reach: str, domai
     with ExitStack() as stack:
         nodes = [
             stack.enter_context(
-                fleet._joined(
+                fleet.joined(
                     fleet.place(surroundings(name, domain, ROS_AUTOMATIC_DISCOVERY_RANGE=reach)).domain,
                     number,
                 )
@@ -85,7 +85,7 @@ def test_arms_with_keys_and_without_them_are_shown_apart(
     (found,) = places([])
     assert found.namespace == shown
     assert dict(found.domain.variables).get("ROS_SECURITY_KEYSTORE") == ("/keys" if secured else None)
-    assert fleet._hidden() == hidden
+    assert fleet.hidden_arms() == hidden
 
 
 def test_named_arm_with_keys_has_no_tag(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,7 +98,7 @@ def test_named_arm_with_keys_has_no_tag(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_domains_keep_their_number_within_the_process() -> None:
     domains = [Domain(0, ()), Domain(0, (("x", "tag"),)), Domain(1, ()), Domain(5, ())]
-    assert [fleet._numbers(domains)[domain] for domain in domains] == [0, 2, 1, 5]
+    assert [fleet.numbers_of(domains)[domain] for domain in domains] == [0, 2, 1, 5]
 
 
 def test_domain_that_cannot_be_joined_hides_no_other(domain: int, capfd: pytest.CaptureFixture[str]) -> None:
@@ -106,29 +106,29 @@ def test_domain_that_cannot_be_joined_hides_no_other(domain: int, capfd: pytest.
         Domain(domain, (("ROS_AUTOMATIC_DISCOVERY_RANGE", reach),)) for reach in ("LOCALHOST", "NOWHERE")
     )
     with ExitStack() as stack:
-        assert [*fleet._nodes(stack, [good, bad])] == [good]
+        assert [*fleet.join(stack, [good, bad])] == [good]
         assert "NOWHERE" in capfd.readouterr().out
         with pytest.raises(DeploymentError, match=f"^Cannot join ROS domain {domain}: .*NOWHERE"):
-            fleet._nodes(stack, [bad])
+            fleet.join(stack, [bad])
 
 
 def test_arm_that_says_it_has_no_keys_needs_none(domain: int) -> None:
     where = Domain(domain, (("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"), ("ROS_SECURITY_ENABLE", "false")))
     with ExitStack() as stack:
-        assert [*fleet._nodes(stack, [where])] == [where]
+        assert [*fleet.join(stack, [where])] == [where]
 
 
-def test_arm_whose_keystore_has_no_fleet_is_told(tmp_path: Path) -> None:
+def test_arm_whose_keystore_has_no_fleet_is_reported(tmp_path: Path) -> None:
     keystore = tmp_path / "keys"
     where = Domain(5, (("ROS_SECURITY_ENABLE", "true"), ("ROS_SECURITY_KEYSTORE", str(keystore))))
     with ExitStack() as stack:
         with pytest.raises(
             DeploymentError, match=f"^Cannot join ROS domain 5: {keystore} is no keystore: make"
         ):
-            fleet._nodes(stack, [where])
+            fleet.join(stack, [where])
         Keystore(keystore).write({"/terminal": rights.observer("/", "terminal")}, [5])
         with pytest.raises(DeploymentError, match=f"{keystore} has no keys for /fleet: make keystore$"):
-            fleet._nodes(stack, [where])
+            fleet.join(stack, [where])
 
 
 def test_arms_of_this_host_and_named_ones_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,7 +158,7 @@ def test_other_dds_than_cyclone_joins_each_domain_once_under_its_number(
     (domain,) = {place.domain for place in found}
     assert (domain.number, CYCLONEDDS in dict(domain.variables)) == (5, False)
     elsewhere = Domain(5, ((RANGE, "SUBNET"),))
-    assert fleet._numbers([domain, elsewhere]) == {domain: 5, elsewhere: 5}
+    assert fleet.numbers_of([domain, elsewhere]) == {domain: 5, elsewhere: 5}
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,44 @@ def test_wrong_name_of_an_arm_is_one_line(name: str) -> None:
         places([name])
 
 
+def test_arm_that_is_seen_once_only_ends_no_watch(monkeypatch: pytest.MonkeyPatch) -> None:
+    lasting, short = (Place(name, Domain(7, ())) for name in ("/lasting", "/short"))
+    seen = iter([{lasting}, {lasting}, {lasting, short}])
+    monkeypatch.setattr(fleet, "places", lambda _: next(seen, {lasting}))
+    watched: list[set[Place]] = []
+
+    def watch(found: set[Place], more: Callable[[], bool], _: object) -> None:
+        watched.append({*found})
+        if len(watched) > 1:
+            raise interruption.Interrupted
+        assert more()
+
+    monkeypatch.setattr(fleet, "watch", watch)
+    with pytest.raises(interruption.Interrupted):
+        fleet.run([])
+    assert watched[0] == {lasting}
+
+
 def test_host_without_an_arm_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "systems", dict)
     with pytest.raises(DeploymentError, match=r"^No arm runs on this host\."):
         fleet.run([])
+
+
+def test_arms_that_ended_last_stay_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    arms = [Place(f"/arm{number}", Domain(7, ())) for number in range(100)]
+    running = iter(
+        [{arms[0], each} for each in arms[1:] for _ in range(2)]
+    )  # looked at by `more`, and by `run`
+    monkeypatch.setattr(fleet, "places", lambda _: next(running))
+    watched: set[Place] = set()
+
+    def watch(found: Collection[Place], more: Callable[[], bool], _: object) -> None:
+        watched.clear()
+        watched.update(found)
+        assert more()
+
+    monkeypatch.setattr(fleet, "watch", watch)
+    with pytest.raises(StopIteration):
+        fleet.run([])
+    assert watched == {arms[0], *arms[-1 - fleet.MOST_ENDED :]}

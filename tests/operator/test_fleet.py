@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from deploy.operator.fleet import Arm, Told, fleet, row, watched
+from deploy.operator.fleet import Arm, Timestamp, fleet, row, watched
 from deploy.supervision import sentinel
 from deploy.supervision.supervisord import Program
 from interfaces.service.health import Health
@@ -77,7 +77,7 @@ def test_arm_that_is_well_is_one_line() -> None:
     ]
     arm = last(script)
     heard = max(health.heard for health in arm.healths.values())
-    fresh = arm._replace(engines=Told(ON, heard), operator=Told(ALIVE, heard))
+    fresh = arm._replace(engines=Timestamp(ON, heard), operator=Timestamp(ALIVE, heard))
     assert row(fresh, heard) == ("/arm1", "0", "robot1", ALIVE, ON, "2 ok", "10.5 s")
 
 
@@ -110,7 +110,7 @@ def well(heard: float, host: str = "robot1", **problems: str) -> Arm:
         (host, name): Health(heard, 7, name not in problems, problems.get(name, "running"), None)
         for name in ("drive", "kinematics", "velocity")
     }
-    return Arm("/", 0, Told(ON, heard), Told(ALIVE, heard), reports)
+    return Arm("/", 0, Timestamp(ON, heard), Timestamp(ALIVE, heard), reports)
 
 
 @pytest.mark.parametrize(
@@ -131,6 +131,14 @@ def test_process_that_does_not_run_is_a_problem() -> None:
     here = socket.gethostname()
     arm = last([(1.0, DIAGNOSTICS, health("/arm1/velocity", host=here)), (1.1, DIAGNOSTICS, states)])
     assert row(arm, arm.healths[here, "velocity"].heard)[5] == "drive: FATAL"
+
+
+@pytest.mark.parametrize(
+    ("problems", "words"), [({}, "3 ok, 1 unheard"), ({"drive": "slow"}, "drive: slow, 1 unheard")]
+)
+def test_programs_that_run_unheard_are_counted(problems: dict[str, str], words: str) -> None:
+    states = {("robot1", "drive"): "RUNNING", ("robot1", "twist"): "RUNNING", ("robot2", "page"): "RUNNING"}
+    assert row(well(10.0, **problems)._replace(states=states), 11.0)[5] == words
 
 
 @pytest.mark.parametrize("ok", [(True, True), (False, True), (True, False)])
@@ -154,7 +162,7 @@ def test_state_of_a_process_on_one_host_hides_no_other() -> None:
 
 
 def told_by(host: str, state: str) -> DiagnosticArray:
-    """Return the state of a process as the sentinel of a host tells it."""
+    """Return the state of a process as the sentinel of a host reports it."""
     (status,) = sentinel.states([Program("drive", state, 7, 0.0, 0, "", "")], {}, {}, "/arm1/sentinel")
     status.hardware_id = host
     return DiagnosticArray(status=[status])
@@ -169,7 +177,7 @@ def test_host_that_another_one_has_replaced_is_forgotten() -> None:
 
 @pytest.mark.parametrize(("operator", "shown"), [(ALIVE, "-"), (MISSED, MISSED)])
 def test_arm_that_falls_silent_shows_nothing_as_fresh(operator: str, shown: str) -> None:
-    arm = well(10.0)._replace(operator=Told(operator, 10.0))
+    arm = well(10.0)._replace(operator=Timestamp(operator, 10.0))
     assert row(arm, 12.8)[3:6] == (shown, "silent", "silent")
 
 
