@@ -17,6 +17,7 @@ SCHEDULE ?=
 SIMULATE ?=
 CHAOS ?=
 RECORD ?=
+LAST := # only of the command line
 REPLAY ?=
 MODULES ?=
 BENCH ?=
@@ -36,12 +37,13 @@ HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
 ifneq ($(HOST),)
 export REACTIVE_ARM_HOST := $(HOST)
 endif
-export PYTHON SCENARIO PARAMETERS MANIFEST WEB RUNTIME
+export PYTHON SCENARIO PARAMETERS MANIFEST WEB LAST RUNTIME
 
 # The variables of each command. Others on the command line are refused, except by `make stop`: it must not fail.
 USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB HOST SECURE
 USED_BY_start := $(USED_BY_run)
 USED_BY_unit := $(USED_BY_run)
+USED_BY_record := LAST
 USED_BY_fleet := ARMS SECURE
 USED_BY_chaos := MINUTES SEED CHAOS SECURE
 USED_BY_simulate := HOURS SEED SCHEDULE SIMULATE
@@ -81,7 +83,8 @@ help:
 	@echo "make terminal attach this terminal to it"
 	@echo "make status   its rclpy, page and services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"
-	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
+	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records;"
+	@echo "                                                  LAST=10: only the last minutes, and each stop)"
 	@echo "make fleet    watch all arms of this host, one line each  (ARMS=\"/arm1 /arm2=5\" for other hosts; SECURE=yes)"
 	@echo "make stop     stop it"
 	@echo "make keystore write the keys with which only this arm's processes meet  (EXPORT=folder ENCLAVES=\"names\" for a host)"
@@ -107,7 +110,7 @@ run start unit: setup
 
 terminal status logs record:
 	@test -e $(STAMP) || { echo ".venv is not set up: make setup (make stop works without it)" >&2; exit 1; }
-	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@
+	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@ $(if $(filter record,$@),"$$LAST")
 
 fleet:
 	@test -e $(STAMP) || { echo ".venv is not set up: make setup" >&2; exit 1; }

@@ -24,7 +24,7 @@ from deploy.supervision.environment import (
     set_middleware,
 )
 from deploy.supervision.errors import DeploymentError
-from deploy.supervision.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
+from deploy.supervision.run_directory import ALL, KEY, LEAD, MANIFEST, RECORDS, RUN
 from deploy.supervision.supervisord import Program
 from deploy.supervision.system import System
 from interfaces.loopback import LOOPBACK_DOWN, loopback_is_up
@@ -39,7 +39,7 @@ BEGIN_LIMIT = 5.0  # s that the services have to confirm the origin of the scena
 STATUS_LIMIT = 3.0  # s for the health of services: the sentinel takes one without for hung after 2.7 s
 LOOK_PERIOD = 0.2  # s between two looks at the states of programs that start
 START_ATTEMPTS = 3  # of a service that dies so slowly that supervisord does not count it as an early death
-RECORDS = "records"  # in the run directory
+MOST_MINUTES = 1440  # of a ring: a day in files of a minute
 LOG_LINES = 15  # of a service that does not start
 LIBRARIES_ARE_KNOWN = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
 """Environment variable: the wheels of ROS 2 leave the environment of this interpreter as it is."""
@@ -170,8 +170,10 @@ def logs(system: System) -> None:
                 break
 
 
-def record(system: System) -> None:
-    """Record the messages of a running system until Ctrl-C or its end."""
+def record(system: System, minutes: str) -> None:
+    """Record the messages of a running system until Ctrl-C or its end; keep all, or only the last minutes."""
+    if minutes and (not minutes.isdecimal() or not 1 <= int(minutes) <= MOST_MINUTES):
+        raise DeploymentError(f"LAST={minutes}: it is a number of minutes, from 1 to {MOST_MINUTES}")
     if not _adopt_environment(system):
         raise DeploymentError("Nothing runs: make start")
     if system.supervisor_has_ended():
@@ -181,7 +183,7 @@ def record(system: System) -> None:
     from deploy.security.rights import RECORDER
 
     with Member(RECORDER) as member:
-        record.write(system.run / RECORDS, member, system)
+        record.write(system.run / RECORDS, member, system, int(minutes or 0))
 
 
 def keystore(_: System, export: str, enclaves: str) -> None:
@@ -328,8 +330,11 @@ def main(arguments: list[str]) -> int:
         command.set_defaults(obey=starts)
         command.add_argument("scenario")
         command.add_argument("parameter_file", nargs="?", default="")
-    for name, joins in (("terminal", attach), ("status", status), ("logs", logs), ("record", record)):
+    for name, joins in (("terminal", attach), ("status", status), ("logs", logs)):
         commands.add_parser(name).set_defaults(obey=joins)
+    recording = commands.add_parser("record")
+    recording.set_defaults(obey=record)
+    recording.add_argument("minutes", nargs="?", default="")
     keys = commands.add_parser("keystore")
     keys.set_defaults(obey=keystore)
     keys.add_argument("export", nargs="?", default="")

@@ -9,16 +9,18 @@ import json
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import reactivex as rx
 import ros_yaml
 from mcap_files import FileWriter
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
@@ -31,6 +33,10 @@ METADATA = "reactive-arm"
 DEPTH = 200  # messages that may wait while the recorder is not scheduled
 HEARTBEAT_PERIOD = 0.05  # s; the switch sends one heartbeat in it
 HEARTBEAT_DEPTH = 10  # as many are read at once; more than one if the recorder was not scheduled
+LOOK_PERIOD = 1.0  # s between two looks for topics of a user's manifest
+ANY_PUBLISHER = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""The QoS that meets every publisher."""
+OF_EACH_NODE = {"/rosout", "/parameter_events"}
 _ONE_MOMENT = 100_000  # ns within which both clocks are read
 
 
@@ -40,6 +46,18 @@ def clocks() -> tuple[int, int]:
         before, epoch, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
         if after - before < _ONE_MOMENT:  # otherwise, the thread has paused in between
             return before, epoch
+
+
+class Sink(Protocol):
+    """Takes the messages of :func:`record`; times are those of the monotonic clock [ns]."""
+
+    def monotonic(self, time_of_day: int, moment: tuple[int, int]) -> int: ...
+
+    def knows(self, type_name: str) -> bool: ...
+
+    def message(
+        self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int
+    ) -> None: ...
 
 
 class Recorder:
@@ -89,9 +107,19 @@ class Recorder:
         data = serialize_message(String(data=json.dumps(event)))
         self.message(topic, "std_msgs/msg/String", "", data, time, time)
 
+    def knows(self, type_name: str) -> bool:
+        """Return whether a record can describe a type, and this process can read it."""
+        package, *_ = type_name.split("/")
+        return type_name in self._types.fielddefs and find_spec(package) is not None
+
     @property
     def count(self) -> int:
         return self._counts.total()
+
+    @property
+    def size(self) -> int:
+        """The bytes that are written, or wait for it."""
+        return self._writer.size
 
     def save(self) -> None:
         """Bring everything so far to the disk; called every ``SAVE_PERIOD``, it limits what a death costs."""
@@ -130,7 +158,7 @@ def qos_profiles(topic: topics.Topic) -> str:
 
 def record(
     node: ReactiveNode,
-    recorder: Recorder,
+    recorder: Sink,
     first: Callable[[str], None] = lambda name: None,
     lost: Callable[[float, float], None] = lambda begin, end: None,
     is_foreign: Callable[[topics.Topic, bytes], bool] = lambda topic, data: False,
@@ -153,15 +181,47 @@ def record(
             _record_all(node, topic, write, lost, is_foreign)
 
 
+def record_others(node: ReactiveNode, recorder: Sink, programs: Collection[str]) -> None:
+    """Record besides the contract what programs publish or read: those of a user's manifest.
+
+    A topic is recorded from the first look at which it exists; of one type, and that of common_interfaces.
+    """
+    known = {node.resolve_topic_name(topic.name) for topic in topics.ROWS} | OF_EACH_NODE
+
+    def look(_: Any) -> None:
+        for name, types in node.topic_types().items():
+            if name in known or not _is_of(node, name, programs):
+                continue
+            known.add(name)
+            if not recorder.knows(types[0]):
+                node.get_logger().warning(f"{name} is not recorded: nothing describes {types[0]}")
+                continue
+            package, folder, kind = types[0].split("/")
+            type_ = getattr(import_module(f"{package}.{folder}"), kind)
+            topic = topics.Topic(name, type_, ANY_PUBLISHER, "", (), (), "")
+            _record_all(node, topic, _writer(node, topic, recorder, lambda _: None))
+
+    rx.timer(0.0, LOOK_PERIOD, node.scheduler).subscribe(look)
+
+
+def _is_of(node: ReactiveNode, topic: str, programs: Collection[str]) -> bool:
+    ends = (*node.publishers_of(topic), *node.subscribers_of(topic))
+    return any(end.node in programs and end.namespace == node.get_namespace() for end in ends)
+
+
 def _writer(
-    node: ReactiveNode, topic: topics.Topic, recorder: Recorder, first: Callable[[str], None]
+    node: ReactiveNode, topic: topics.Topic, recorder: Sink, first: Callable[[str], None]
 ) -> Callable[[bytes, int], int]:
     """Return what records a message and its source time [ns since 1970], and returns its reception [ns]."""
     name, offered = node.resolve_topic_name(topic.name), qos_profiles(topic)
+    too_large = f"{name}: messages of more than {topic.largest} octets are not recorded, as none reads them"
     is_first = True
 
     def write(data: bytes, source_time: int) -> int:
         nonlocal is_first
+        if len(data) > topic.largest:
+            node.get_logger().warning(too_large, once=True)
+            return clocks()[0]
         if is_first:
             first(name)
             is_first = False
@@ -189,8 +249,8 @@ def _record_all(
     node: ReactiveNode,
     topic: topics.Topic,
     write: Callable[[bytes, int], int],
-    lost: Callable[[float, float], None],
-    is_foreign: Callable[[topics.Topic, bytes], bool],
+    lost: Callable[[float, float], None] = lambda begin, end: None,
+    is_foreign: Callable[[topics.Topic, bytes], bool] = lambda topic, data: False,
 ) -> None:
     # The loss is reported before or after the next message is: the one before both is among the last two.
     last_two: deque[int] = deque(maxlen=2)

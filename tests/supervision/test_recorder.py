@@ -15,6 +15,7 @@ from reactivex.testing import TestScheduler
 
 from deploy.supervision import recorder
 from interfaces import topics
+from interfaces.limits import LARGEST_MESSAGE
 
 FOREIGN = b"from another publisher"
 
@@ -47,9 +48,13 @@ class Subscriptions:
         self.lose: dict[str, Any] = {}
         self.readers: dict[str, Reader] = {}
         self.scheduler = TestScheduler()
+        self.warnings: list[str] = []
 
     def resolve_topic_name(self, name: str) -> str:
         return name
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(warning=lambda text, once: self.warnings.append(text))
 
     def create_subscription(
         self, kind: type, name: str, write: Any, qos: Any, *, event_callbacks: Any, **_: Any
@@ -107,7 +112,7 @@ def receive(
 
 def lose(node: Subscriptions, clock: Clock, at: float, topic: topics.Topic = topics.L2) -> None:
     clock.now = at
-    if callback := node.lose[topic.name]:  # without one, rclpy tells nobody
+    if callback := node.lose[topic.name]:  # without one, rclpy reports nothing
         callback(SimpleNamespace(total_count=1, total_count_change=1))
 
 
@@ -206,6 +211,16 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> list[tuple[bytes, int]]:
     )
     monkeypatch.setattr(time, "time_ns", lambda: time.monotonic_ns() + 10**18)
     return messages
+
+
+def test_message_that_no_service_reads_is_not_recorded(
+    node: Subscriptions, clock: Clock, recorded: list[tuple[bytes, int]]
+) -> None:
+    info = {"source_timestamp": 10**18, "publication_sequence_number": 1}
+    for size in (LARGEST_MESSAGE + 1, LARGEST_MESSAGE):
+        node.write[topics.DIAGNOSTICS.name](bytes(size), info)
+    assert [len(data) for data, _ in recorded] == [LARGEST_MESSAGE]
+    assert "/diagnostics: messages of more than 32768 octets are not recorded" in node.warnings[0]
 
 
 def send_heartbeat(node: Subscriptions, clock: Clock, at: float) -> None:

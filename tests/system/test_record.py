@@ -6,7 +6,9 @@ import os
 import re
 import resource
 import signal
+import subprocess
 import time
+from contextlib import closing
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -15,16 +17,19 @@ import pytest
 from mcap_files import McapFile
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from std_msgs.msg import String
 
-from deploy.supervision.rclpy_choice import sourced_rclpy
+from deploy.supervision.processes import ROOT
 from interfaces import topics
-from tests.system.sites import LIMIT, ROOT, Command, Site
+from tests.system.records import engine_states
+from tests.system.sites import LIMIT, Command, Peer, Site
 
 TYPES = {
     topic.name if topic.name.startswith("/") else f"/arm1/{topic.name}": topic.type_name
     for topic in topics.CONTRACT
 }
-EVENTS = {"/arm1/engines", "/arm1/operator_activity", "/arm1/operator_presence", "/arm1/operator_heartbeat"}
+OF_OPERATOR = ("operator_activity", "operator_presence", "operator_heartbeat", "operator_hand")
+EVENTS = {f"/arm1/{name}" for name in ("engines", "engines/sender", *OF_OPERATOR)}
 """Topics that may stay silent while the record lasts."""
 LATCHED = {f"/arm1/{topic.name}" for topic in topics.CONTRACT if topics.is_latched(topic.qos)}
 SUMMARY = r"(/.*\.mcap): ([\d.]+) s, (\d+) messages, ([\d.]+) MB"
@@ -113,7 +118,7 @@ def test_record_is_complete_when_the_system_ends(small_site: Site) -> None:
         assert reader.message_count == int(command.await_line(SUMMARY)[3])
 
 
-def test_record_tells_that_supervisord_has_died(small_site: Site) -> None:
+def test_record_reports_that_supervisord_has_died(small_site: Site) -> None:
     assert small_site.do("start", "demo")[0] == 0
     command = record(small_site)
     os.kill(small_site.members[""], signal.SIGKILL)
@@ -127,6 +132,32 @@ def test_record_tells_that_supervisord_has_died(small_site: Site) -> None:
     assert len(list((small_site.run / "records").iterdir())) == 1
 
 
+def test_ring_keeps_what_surrounds_a_stop(site: Site) -> None:
+    assert site.do("start", "demo")[0] == 0
+    command = site.begin("record", "1")
+    records = Path(command.await_line(r"Recording to (/.*)/ring until Ctrl-C")[1])
+    with closing(Peer(site.domain)) as peer:
+        commands = peer.publisher(topics.ENGINES)
+        peer.spin_until(
+            lambda: any(engine_states(path).count(topics.ON) >= 5 for path in records.glob("ring/*"))
+        )
+        commands.publish(String(data=topics.TURN_OFF))
+        peer.spin_until(lambda: list(records.glob("stop-*")))
+    command.signal(signal.SIGINT)
+    assert command.wait() == 0
+    command.await_line(r"/.*/ring: [\d.]+ s, \d+ messages, [\d.]+ MB")
+    (stop,) = records.glob("stop-*")
+    assert set(engine_states(stop)) == {topics.ON, topics.OFF}
+
+
+@pytest.mark.parametrize("minutes", ["0", "-1", "ten", "1441", "1.5"])
+def test_ring_of_no_number_of_minutes_is_refused(minutes: str) -> None:
+    outside = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    make = ["make", "record", f"LAST={minutes}"]
+    done = subprocess.run(make, cwd=ROOT, env=outside, capture_output=True, text=True)
+    assert done.stderr.splitlines()[0] == f"LAST={minutes}: it is a number of minutes, from 1 to 1440"
+
+
 def test_record_of_nothing_is_refused(site: Site) -> None:
     assert site.do("record") == (1, "Nothing runs: make start")
 
@@ -134,8 +165,6 @@ def test_record_of_nothing_is_refused(site: Site) -> None:
 @pytest.mark.timed
 def test_record_of_a_real_arm_replays_equal_in_virtual_time(site: Site) -> None:
     """What simulation and replay show holds for the rclpy of the real arm: both give the same output."""
-    if sourced_rclpy():
-        pytest.skip("platform: a sourced ROS 2 leaves no choice")
     assert site.do("start", "demo")[0] == 0
     command = record(site)
     time.sleep(15.0)  # the engines have been turned on, and the arm has moved
