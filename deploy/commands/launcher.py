@@ -157,10 +157,10 @@ def logs(system: System) -> None:
     if system.supervisor_has_ended():
         nothing = f"Nothing runs: make start. The logs of the last run are in {system.logs}"
         raise DeploymentError(messages.unattended(system.run) if system.members() else nothing)
-    files = sorted(f"{system.logs.name}/{path.name}" for path in system.logs.glob("*.log"))
+    files = [system.run / "supervisord.log", *sorted(system.logs.glob("*.log"))]
     from deploy.commands.logs import follow, readable
 
-    with closing(follow(system.run, ["supervisord.log", *files])) as lines:
+    with closing(follow(files)) as lines:
         for line in lines:
             interruption.check()
             if line is not None:

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import itertools
 import os
 import time
+from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from deploy.commands.logs import follow, readable
+from deploy.commands.logs import Line, follow, readable
 from deploy.supervision.run_directory import RUN, RunDirectory
 from deploy.supervision.system import System
 
@@ -30,18 +33,55 @@ def _berlin(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_time_of_a_line_is_readable(line: bytes, shown: bytes) -> None:
-    assert readable(line) == shown
+    assert readable(Line(0.0, "velocity", line)) == b"velocity           " + shown
 
 
-def test_lines_come_whole_and_silence_is_told(tmp_path: Path) -> None:
+def texts(lines: Iterable[Line | None]) -> list[bytes]:
+    """Return the texts until nothing is new."""
+    return [line.text for line in itertools.takewhile(lambda line: line is not None, lines) if line]
+
+
+def test_lines_come_whole_and_silence_is_reported(tmp_path: Path) -> None:
     log = tmp_path / "a.log"
     log.write_bytes(b"one\ntwo\nthr")
-    lines = follow(tmp_path, ["a.log"])
-    assert [next(lines), next(lines), next(lines)] == [b"one", b"two", None]
-    with log.open("ab") as file:
-        file.write(b"ee\n")
-    assert next(line for line in lines if line is not None) == b"three"
-    lines.close()
+    with closing(follow([log])) as lines:
+        assert texts(lines) == [b"one", b"two"]
+        with log.open("ab") as file:
+            file.write(b"ee\n")
+        assert texts(lines) == [b"three"]
+
+
+def test_lines_of_all_files_are_in_the_order_of_their_times(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.log", tmp_path / "second.log"
+    first.write_bytes(
+        b"[INFO] [1764274498.100] [first]: one\n[ERROR] [1764274500.100] [first]: four\nTrace\n"
+    )
+    second.write_bytes(b"2025-11-27 21:14:59,000 INFO two\n[INFO] [1764274499.500] [second]: three\n")
+    (tmp_path / "third.log").write_bytes(b"-------------------- 2025-11-27 21:14:57 --------------------\n")
+    with closing(follow([first, second, tmp_path / "third.log"])) as lines:
+        shown = [line.split()[-1] for line in texts(lines)]
+    assert shown == [b"-" * 20, b"one", b"two", b"three", b"four", b"Trace"]
+
+
+def test_only_the_latest_lines_of_a_file_are_shown(tmp_path: Path) -> None:
+    log = tmp_path / "a.log"
+    log.write_bytes(b"".join(b"%d %s\n" % (n, b"x" * 100) for n in range(2000)))
+    with closing(follow([log])) as lines:
+        assert [int(text.split()[0]) for text in texts(lines)] == [*range(1990, 2000)]
+
+
+def test_file_that_is_replaced_or_emptied_is_followed(tmp_path: Path) -> None:
+    log = tmp_path / "a.log"
+    log.write_bytes(b"one\n")
+    with closing(follow([log])) as lines:
+        assert texts(lines) == [b"one"]
+        with log.open("ab") as file:
+            file.write(b"two\n")
+        log.rename(tmp_path / "a.log.1")
+        log.write_bytes(b"three\n")
+        assert texts(lines) == [b"two", b"three"]
+        log.write_bytes(b"4\n")
+        assert texts(lines) == [b"4"]
 
 
 def test_a_line_stands_between_two_runs(tmp_path: Path) -> None:
@@ -74,6 +114,7 @@ def test_a_line_stands_between_two_boots_of_a_unit(tmp_path: Path, monkeypatch: 
     log.write_text("first boot\n")
     with pytest.raises(Replaced):
         system.become_supervisord({}, ["--nodaemon"])
+    system.remove_settings()
     first, between = log.read_text().splitlines()
     assert first == "first boot"
     assert between.startswith(RUN)
