@@ -380,8 +380,8 @@ OPERATOR_HAND = Topic(
     Header,
     _qos(1, reliable=False),
     "",
-    ("dead_mans_switch",),
-    (),
+    OPERATOR_HEARTBEAT.publishers,
+    OPERATOR_NODES,
     f"whose hand sends `{OPERATOR_HEARTBEAT.name}`: `frame_id` is the node. At most 5 Hz; for display only",
     longest_gap=math.inf,
     follows=OPERATOR_HEARTBEAT.name,
@@ -425,8 +425,8 @@ ENGINES_SENDER = Topic(
     KeyValue,
     _EVENTS,
     "",
-    tuple(each for each in ENGINES.publishers if each != "terminal"),
-    ("engine_controller",),
+    ENGINES.publishers,
+    ("engine_controller", *OPERATOR_NODES),
     f"who has just sent a command on `{ENGINES.name}`: `key` is the command, `value` the node. For display "
     "only: a command counts without it",
     lambda sender: ENGINES.problem(sender.command) or _not_a_name(sender.node),
@@ -450,7 +450,7 @@ ENGINES_CAUSE = Topic(
     _STATE,
     "s",
     ("engine_controller",),
-    (),
+    OPERATOR_NODES,
     f"why `{ENGINES_STATE.name}` is as it is, in the words of `message`; `values` name the deciding event, "
     "its sender and age, and why a `turn_on` was refused. Within 0.2 s of each change; for display only",
     cause.problem,
@@ -525,7 +525,7 @@ def mermaid() -> str:
     """
     lines = ["flowchart LR"]
     for topic in CONTRACT:
-        if topic is not DIAGNOSTICS and topic.subscribers:
+        if topic is not DIAGNOSTICS:
             readers = [node for node in topic.subscribers if node not in (*OPERATOR_NODES, FLEET)]
             ends = (" & ".join(topic.publishers), " & ".join(readers or topic.subscribers))
             lines.append(f"    {ends[0]} -- {topic.name} --> {ends[1]}")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NoReturn
 from deploy.commands.status import health_of, of_services
 from deploy.commands.stop import stop
 from deploy.operator.output import say, use_plain_output
-from deploy.supervision import interruption, manifest, messages, rclpy_choice
+from deploy.supervision import interruption, manifest, messages, rclpy_choice, vulnerabilities
 from deploy.supervision.environment import (
     NAMESPACE,
     RANGE,
@@ -63,8 +63,7 @@ def run(system: System, scenario: str, parameter_file: str) -> None:
     """Run the system in this terminal until the user ends it."""
     with _started(system, scenario, parameter_file) as member:
         _show(system, member, owner=True)
-    interruption.ignore()
-    stop(system)
+        _end(system)  # first: to leave the ROS graph takes its time, and may fail
 
 
 def start(system: System, scenario: str, parameter_file: str) -> None:
@@ -94,6 +93,7 @@ def become(system: System, scenario: str, parameter_file: str) -> NoReturn:
     with _chosen(scenario):
         parameters.check_environment(system)
         given = parameters.of_system(scenario, parameter_file)
+        _warn()
         if not is_alone(os.environ):
             with Member() as member, hosts.checked(member, system):
                 pass
@@ -122,6 +122,7 @@ def status(system: System) -> None:
         return
     from deploy.commands import hosts
     from deploy.commands.member import Member
+    from deploy.operator.glance import Glance
 
     programs = system.programs()
     running = [program for program in programs if program.pid]
@@ -129,7 +130,7 @@ def status(system: System) -> None:
     print(_bound(system))
     if page := system.page:
         print(page)
-    if not loopback_is_up():  # so no health can be heard, not even that of the sentinel, which tells of it
+    if not loopback_is_up():  # so no health can be heard, not even that of the sentinel, which reports it
         print(f"loopback: {LOOPBACK_DOWN}")
         print(of_services(programs, {}))
         return
@@ -138,17 +139,22 @@ def status(system: System) -> None:
     try:
         with Member() as member, hosts.heard(member.node) as heard:
             deadline = time.monotonic() + STATUS_LIMIT
+            glance = Glance(member.node)
             _listen(member, running, heard.healths, STATUS_LIMIT)
-            theirs = heard.processes
-            while time.monotonic() < deadline and not all(
-                name in theirs and health_of(theirs[name], heard.healths) for name in elsewhere
+            while time.monotonic() < deadline and not (
+                glance.is_complete
+                and all(
+                    name in heard.processes and health_of(heard.processes[name], heard.healths)
+                    for name in elsewhere
+                )
             ):
                 member.spin_once()
-    except DeploymentError:  # for example, its keys have ended; supervisord tells its part
+    except DeploymentError:  # for example, its keys have ended; supervisord reports its part
         print(of_services(programs, {}))
         raise
+    print(glance.words)
     print(heard.clocks(), end="")
-    programs += [theirs[name] for name in host_of if name in elsewhere & theirs.keys()]
+    programs += [heard.processes[name] for name in host_of if name in elsewhere & heard.processes.keys()]
     print(of_services(programs, heard.healths, host_of if elsewhere else {}))
 
 
@@ -193,6 +199,19 @@ def keystore(_: System, export: str, enclaves: str) -> None:
         writer.write(export, enclaves)
 
 
+def _warn() -> None:
+    from interfaces.service import middleware
+
+    if warning := vulnerabilities.warning(os.environ):
+        print(warning, flush=True)
+    if why := middleware.shared_memory():
+        print(
+            f"WARNING: Fast DDS uses shared memory, because {why}: a killed process stops others for seconds,"
+            " and leaves half a MB in /dev/shm (deploy/SAFETY.md)",
+            flush=True,
+        )
+
+
 def _chosen(scenario: str) -> AbstractContextManager[None]:
     from deploy.commands.parameters import NONE
 
@@ -211,6 +230,7 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
         stack.enter_context(_chosen(scenario))
         parameters.check_environment(system)
         given = parameters.of_system(scenario, parameter_file)
+        _warn()
         member = stack.enter_context(Member())
         check_again = stack.enter_context(hosts.checked(member, system))
         log_sizes = {path.stem: path.stat().st_size for path in system.logs.glob("*.log")}
@@ -228,9 +248,14 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
                 print(page, flush=True)
             yield member
         except BaseException:
-            interruption.ignore()
-            stop(system)
+            _end(system)
             raise
+
+
+def _end(system: System) -> None:
+    """Stop the system, whatever signals come meanwhile."""
+    interruption.ignore()
+    stop(system)
 
 
 def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -> None:
@@ -238,7 +263,12 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
 
     deadline = time.monotonic() + START_LIMIT
     with heard_healths(member.node) as health:
-        while missing := [program for program in system.programs() if not health_of(program, health)]:
+        later = [program.name for program in manifest.programs() if not program.starts]
+        while missing := [
+            program
+            for program in system.programs()
+            if program.name not in later and not health_of(program, health)
+        ]:
             for program in missing:
                 if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
                     words = _last_words(system, program, log_sizes.get(program.name, 0))
@@ -275,7 +305,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
     # In the background, reading the terminal fails and does not stop the process.
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     parent = os.getppid()
-    with Terminal(member.node, system.origin(), attached=not owner) as terminal:
+    with Terminal(member.node, system.origin(), is_new=owner) as terminal:
         say(_bound(system))
         say(HELP)
         is_connected = True
@@ -296,7 +326,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
 
 
 def _bound(system: System) -> str:
-    """The line that tells how soon the engines stop."""
+    """The line that says how soon the engines stop."""
     from deploy.supervision.parameter_file import reaction_to
 
     try:
@@ -323,6 +353,7 @@ def _adopt_environment(system: System) -> bool:
 def main(arguments: list[str]) -> int:
     interruption.install()
     use_plain_output()
+    os.umask(0o077)  # as supervisord: what is in the run directory is its user's
     parser = argparse.ArgumentParser(prog="launcher")
     commands = parser.add_subparsers(required=True)
     for name, starts in (("run", run), ("start", start), ("unit", unit), ("become", become)):

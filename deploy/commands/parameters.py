@@ -11,7 +11,7 @@ from typing import Any
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
-from deploy.operator.page.address import DEFAULT_PORT, host_names, tls
+from deploy.operator.page.address import host_names, tls
 from deploy.security.keystore import Keystore
 from deploy.security.rights import TERMINAL
 from deploy.supervision import manifest, parameter_file, processes
@@ -82,7 +82,7 @@ def _page_files(user_file: str, given: Mapping[str, Any]) -> dict[str, str]:
     host = given.get("address", declared["address"].default)
     try:
         tls(host, files.get("certificate", ""), files.get("key", ""))
-        host_names(host, DEFAULT_PORT, given.get("names", "").split())
+        host_names(host, given.get("names", "").split())
     except UserError as error:
         raise DeploymentError(f"{user_file}: {manifest.PAGE}: {error}") from None
     return files

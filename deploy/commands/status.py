@@ -28,7 +28,8 @@ def of_services(
     """
     rows = [HEADER, *(_row(program, health_of(program, healths)) for program in programs)]
     if hosts:
-        column = ["HOST", *(hosts[program.name] for program in programs)]
+        # An arm of an older checkout may have programs that this one does not know.
+        column = ["HOST", *(hosts.get(program.name, "-") for program in programs)]
         rows = [(host, *row) for host, row in zip(column, rows, strict=True)]
     return table(rows)
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from deploy.supervision.parameter_file import USE_SIM_TIME, declared
+from deploy.supervision.processes import ROOT
 from interfaces import topics
 
-ROOT = Path(__file__).resolve().parents[2]
 HEAD = (
     "| service | parameter | default | range | unit | settable | meaning |\n|---|---|---|---|---|---|---|\n"
 )
@@ -43,7 +42,7 @@ def parameters() -> str:
 
 
 PAGES = {"interfaces/README.md": (topics.markdown, parameters), "services/README.md": (topics.mermaid,)}
-"""What is generated on each page."""
+"""The generated parts of each page."""
 
 
 def _shown(value: object) -> str:

@@ -9,43 +9,52 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.publisher import Publisher
 from reactivex import Observable
 from reactivex.subject import Subject
 from std_msgs.msg import Bool
 
 from deploy.operator import hold
 from deploy.operator.output import say
-from deploy.operator.remote import parameter_changes
+from deploy.operator.remote import PARAMETER_EVENTS, parameter_changes
 from deploy.operator.switch import VIRTUAL_SWITCH, VirtualSwitch
-from interfaces.topics import OPERATOR_HEARTBEAT
+from interfaces import hand
+from interfaces.service.reading import Drop, observe, unreported
+from interfaces.topics import OPERATOR_HAND, OPERATOR_HEARTBEAT
 from reactive_node import ReactiveNode
 
 BEAT_PERIOD = 0.05  # s
 LONGEST_PAUSE = 1.0  # s between two beats; after a longer one the hand has to press again
 NAME = "terminal"
+INPUT_ENDED = "Released: the input of this terminal has ended, so nobody could release here."
 TAKEN = "Another hand has taken or released the switch."
 PAUSED = "Released: {}, because this terminal stood still. Press again."
 
 
 class Hand:
-    def __init__(self, node: ReactiveNode, tell: Callable[[str], None] = say) -> None:
-        """:param tell: tells the user what becomes of the hand."""
-        self._node = node
-        self._tell = tell
-        self._publisher: Publisher | None = None  # exists while the hand holds: so pages know who holds
+    def __init__(
+        self, node: ReactiveNode, report: Callable[[str], None] = say, drop: Drop = unreported
+    ) -> None:
+        """:param report: shows the user what becomes of the hand.
+        :param drop: see :mod:`interfaces.service.reading`.
+        """
+        self._report = report
+        self.holds = False
+        self._heartbeats, self._hands = (
+            node.create_publisher(topic.type, topic.name, topic.qos)
+            for topic in (OPERATOR_HEARTBEAT, OPERATOR_HAND)
+        )
+        self._beats: Subject[None] = Subject()
         self._events: Subject[hold.Event] = Subject()
         self._takes: Subject[None] = Subject()
+        headers = hand.headers(self._beats, node.get_name())
+        headers.subscribe(self._hands.publish, scheduler=node.scheduler)
         holds = hold.holds(self._events, hold.monotonic, LONGEST_PAUSE)
         holds.subscribe(self._follow, scheduler=node.scheduler)
-        switch = VirtualSwitch(node, hold.monotonic)
-        others = switch.by_others(parameter_changes(node))
-        others.subscribe(self._give_way, scheduler=node.scheduler)
+        switch = VirtualSwitch(node)
+        events = observe(node, PARAMETER_EVENTS, drop)
+        others = switch.by_others(parameter_changes(events, node.get_namespace()))
+        others.subscribe(lambda _: self.end(TAKEN), scheduler=node.scheduler)
         self._takes.switch_map(lambda _: self._insist(switch.take())).subscribe(scheduler=node.scheduler)
-
-    @property
-    def holds(self) -> bool:
-        return self._publisher is not None
 
     def press(self) -> None:
         """Hold the switch, and take it from all other hands and the scenario."""
@@ -62,29 +71,25 @@ class Hand:
         if self.holds:
             self._events.on_next(hold.Beat(NAME, hold.monotonic()))
 
-    def _give_way(self, _: bool) -> None:
+    def end(self, why: str) -> None:
+        """End the hold, if there is one, and report why."""
         if self.holds:
-            self._tell(TAKEN)
+            self._report(why)
             self._events.on_next(hold.Release())
 
     def _follow(self, state: hold.Hold) -> None:
+        was_held, self.holds = self.holds, state.alive
         if state.alive:
-            topic = OPERATOR_HEARTBEAT
-            self._publisher = self._publisher or self._node.create_publisher(
-                topic.type, topic.name, topic.qos
-            )
-            self._publisher.publish(Bool(data=True))
-        elif self._publisher is not None:
-            self._node.destroy_publisher(self._publisher)
-            self._publisher = None
-            if state.ended:
-                self._tell(PAUSED.format(state.ended[1]))
+            self._heartbeats.publish(Bool(data=True))
+            self._beats.on_next(None)
+        elif was_held and state.ended:
+            self._report(PAUSED.format(state.ended[1]))
 
-    def _insist(self, attempt: Observable[bool]) -> Observable[bool]:
+    def _insist(self, attempt: Observable[str]) -> Observable[str]:
         """Try until the virtual switch answers: a process that is killed loses the request."""
 
-        def again(error: Exception, _: Any) -> Observable[bool]:
-            self._tell(f"{VIRTUAL_SWITCH} does not answer: trying again until it does")
+        def again(error: Exception, _: Any) -> Observable[str]:
+            self._report(f"{VIRTUAL_SWITCH} does not answer: trying again until it does")
             return attempt.retry()
 
         return attempt.catch(again)

@@ -6,44 +6,41 @@ While my hand holds the page, I count as alive; when hand, page, browser or netw
 
 from __future__ import annotations
 
+import os
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import reactivex as rx
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from reactivex import Observable
 from reactivex.abc import SchedulerBase
 from reactivex.subject import BehaviorSubject, Subject
 
 from deploy.operator import hold
-from deploy.operator.engines import NOT_YET, OLDER, Engines, graph
 from deploy.operator.lines import line_batches
 from deploy.operator.page import address, protocol, requests, server, state
 from deploy.operator.page.history import SPAN
+from deploy.operator.page.records import Records
 from deploy.operator.page.site import Site
-from deploy.operator.remote import parameter_changes
-from deploy.operator.switch import VIRTUAL_SWITCH, Switch
-from deploy.supervision import manifest
+from deploy.operator.remote import PARAMETER_EVENTS, parameter_changes
+from deploy.operator.strikes import new_watchdogs
+from deploy.operator.switch import Switch
+from deploy.supervision import manifest, processes
 from deploy.supervision.reaction import reaction
-from interfaces import service, topics
+from deploy.supervision.run_directory import RECORDS
+from interfaces import hand, service, topics
 from interfaces.loopback import loopback_is_up
+from interfaces.plain_text import plain
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Epoch
-from interfaces.topics import TURN_OFF
-from reactive_node import stamps
 from services import engine_controller, operator_watchdog
 
 LINGER = SPAN  # s after the last page has left until its topics are given up: the next one shows this time
 LINES_PERIOD = 0.5  # s
-TERMINALS_PERIOD = 0.5  # s
 LOOPBACK_PERIOD = 1.0  # s
-BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-UNSEEN = replace(topics.ENGINES_STATE, qos=BEST_EFFORT)
-"""The engines' state while no page shows it. To read and acknowledge it ten times a second would cost more
-than the rest of this process."""
-UNSEEN_PERIOD = 0.3  # s
 
 
 @dataclass(frozen=True)
@@ -80,25 +77,26 @@ def wire(node: ServiceNode) -> None:
     parameters, given = node.declare(Parameters), node.declare(_Parameters)
     tls = address.tls(parameters.address, parameters.certificate, parameters.key)
     epoch = Epoch(node)
-    clock = state.Clock(hold.monotonic, node.age, lambda: epoch.elapsed() if epoch.is_known else 0.0)
+    clock = state.Clock(
+        hold.monotonic, node.age, lambda: epoch.elapsed() if epoch.is_known else 0.0, node.stamp_age
+    )
     initial = state.PageState(
         strikes=given.strikes,
         max_presence_age=given.max_presence_age,
-        engines=Engines(since_when=OLDER if epoch.is_past else NOT_YET),
+        silence=given.silence,
+        presence_timeout=given.presence_timeout,
     )
     newest = BehaviorSubject(initial)
 
     # What pages do: they open, hold the switch, and ask for something
     events: Subject[server.Event] = Subject()
     is_open = pages_are_open(events, node.scheduler).share()
-    set_elsewhere = during(is_open, parameter_changes(node)).share()
+    parameter_events = node.observe(PARAMETER_EVENTS)
+    set_elsewhere = during(is_open, parameter_changes(parameter_events, node.get_namespace())).share()
     hands = only(events, hold.Press, hold.Beat, hold.Release)
-    switch = Switch(node, hands, set_elsewhere, is_open, clock.now)
+    switch = Switch(node, hands, set_elsewhere, clock.now)
     asked = only(events, server.Request).share()
-    commands = requests.engine_commands(asked).share()
-    node.publish(topics.ENGINES, commands.map(lambda command: command.value))
-    turn_offs = commands.filter(lambda command: command.value == TURN_OFF).share()
-    own_turn_offs = turn_offs.map(lambda command: (command.timestamp, stamps.now()))  # it is published by now
+    node.publish(topics.ENGINES, requests.engine_commands(asked))
     configuration = requests.Configuration(node)
     signals = asked.filter(lambda it: isinstance(it.message, protocol.Process))
 
@@ -108,29 +106,27 @@ def wire(node: ServiceNode) -> None:
     def seen(topic: topics.Topic) -> Observable[Any]:
         return observed[topic.name]
 
-    unseen = node.observe_sampled(UNSEEN, UNSEEN_PERIOD, timestamped=True)
-    engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else unseen)
     ticks = rx.interval(LINES_PERIOD, node.scheduler)
-    present = graph(node)
-    lines = line_batches(seen, own_turn_offs, ticks, present, node.get_namespace())
+    lines = line_batches(seen, ticks, node.get_namespace())
 
     # What pages show
     changes = rx.merge(
-        state.always(seen, engines, new_watchdogs(node, epoch), present, clock),
+        state.always(seen, new_watchdogs(node, first_is_new=not epoch.is_past), clock),
         during(is_open, state.while_open(seen, lines, node.get_namespace(), clock)),
         switch.holds.map(state.held),
-        switch.pressed.map(state.pressed),
-        during(is_open, terminal_holds(node)).map(state.held_at_terminal),
         during(is_open, loopback(node)).map(state.connected),
-        turn_offs.map(lambda _: state.turned_off(clock.now())),
         configuration.followers(set_elsewhere, is_open),
         configuration.outcomes(asked),
         signals.flat_map(lambda it: requests.send_signal(it, newest.value.programs)),
     )
     # A scheduler would subscribe to one part of the recipe after another, and the first page may be faster.
     state.page_states(changes, initial).subscribe(newest.on_next, node.fail)
-    node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds))
-    only(events, server.Violation).subscribe(lambda it: node.health.drop("page", it.reason))
+    beats = hold.heartbeats(switch.holds).share()
+    node.publish(topics.OPERATOR_HEARTBEAT, beats)
+    node.publish(topics.OPERATOR_HAND, hand.headers(beats, node.get_name()))
+    requests.faults(asked).subscribe(lambda text: node.get_logger().error(f"a page: {plain(text)}"))
+    violations = only(events, server.Violation).flat_map(lambda it: rx.repeat_value(it.reason, it.times))
+    violations.subscribe(lambda reason: node.health.drop("page", reason))
 
     def receive(event: server.Event) -> None:
         node.scheduler.schedule(lambda *_: events.on_next(event))
@@ -152,25 +148,6 @@ def pages_are_open(events: Observable[server.Event], scheduler: SchedulerBase) -
 
 def during(is_open: Observable[bool], items: Observable[Any]) -> Observable[Any]:
     return is_open.switch_map(lambda it: items if it else rx.never())
-
-
-def new_watchdogs(node: ServiceNode, epoch: Epoch) -> Observable[bool]:
-    """Emit for each operator watchdog that appears whether it is new; the first may be older than us."""
-    topic = topics.OPERATOR_ACTIVITY
-    matches = node.create_event_observable(topic.type, topic.name, topic.qos, "matched")
-    appeared = matches.filter(lambda it: it.current_count_change > 0)
-    return appeared.map_indexed(lambda _, index: index > 0 or not epoch.is_past)
-
-
-def terminal_holds(node: ServiceNode) -> Observable[bool]:
-    """Emit whether a hand at a terminal sends heartbeats: it has a publisher then."""
-    name = node.resolve_topic_name(topics.OPERATOR_HEARTBEAT.name)
-    services = (VIRTUAL_SWITCH, manifest.PAGE)
-
-    def look(_: Any) -> bool:
-        return any(each.node_name not in services for each in node.get_publishers_info_by_topic(name))
-
-    return rx.timer(0.0, TERMINALS_PERIOD, node.scheduler).map(look).distinct_until_changed()
 
 
 def loopback(node: ServiceNode) -> Observable[bool]:
@@ -200,11 +177,13 @@ def serve(
         node.remark("page", str(error))
         return
     port = listener.getsockname()[1]
-    names = address.host_names(parameters.address, port, parameters.names.split())
+    names = address.host_names(parameters.address, parameters.names.split())
     scheme = "https" if tls else "http"
+    run = os.environ.get(processes.MARK)
     pages = server.PageServer(
         listener,
         Site(token, names, scheme),
+        Records(Path(run) / RECORDS if run else None, clock.elapsed),
         welcome=welcome(given),
         receive=receive,
         newest=newest,
@@ -212,8 +191,9 @@ def serve(
         fail=node.fail,
         tls=tls,
     )
-    node.context.on_shutdown(pages.close)
-    note(node, file, f"The page: {scheme}://{names[0]}/#{token}")
+    # rclpy keeps a bound method by a weak reference: it would go while rclpy walks through its callbacks.
+    node.context.on_shutdown(partial(pages.close))
+    note(node, file, f"The page: {scheme}://{names[0]}:{port}/#{token}")
 
 
 def note(node: ServiceNode, file: address.AddressFile, line: str) -> None:
@@ -232,6 +212,7 @@ def welcome(given: _Parameters) -> dict[str, Any]:
         "strikes": given.strikes,
         "silence": given.silence,
         "presence_timeout": given.presence_timeout,
+        "on_lasts": topics.ENGINES_STATE.qos.lifespan.nanoseconds / 1e9,
         "off_within": of_this_arm.off_within,
         "beat": server.UPDATE_PERIOD,
         "max_nonce_age": hold.MAX_NONCE_AGE,

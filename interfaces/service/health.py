@@ -35,7 +35,6 @@ FASTEST = "fastest"
 """A fact of a joint that follows a drive: the speed that its scenario does not exceed [rad/s]."""
 BY_HAND = "by hand"
 """A fact of a source whose value is set by hand: the name of the parameter."""
-_SINCE_TURN_OFF = "seconds_since_turn_off"
 _PARAMETER = "parameter "  # before its name
 _REFUSED = "refused "  # before the subject
 _REASONS, _OTHER_REASONS = 4, "other reasons"  # in a report, for each subject
@@ -89,7 +88,6 @@ class HealthReporter:
         self._published = 0
         self.dropped = 0  # messages since the start
         self._last_output: float | None = None
-        self._last_turn_off: float | None = None
         self.standing: Mapping[str, str] = {}
         """The warnings of each report until they are changed: the reason by subject."""
         self.facts: Mapping[str, str] = {}
@@ -115,10 +113,6 @@ class HealthReporter:
     def count_output(self) -> None:
         self._published += 1
         self._last_output = time.monotonic()
-
-    def note_turn_off(self) -> None:
-        """Report when the last ``turn_off`` was sent."""
-        self._last_turn_off = time.monotonic()
 
     def drop(self, subject: str, reason: str) -> None:
         """Count a dropped message and remark the reason."""
@@ -173,7 +167,6 @@ class HealthReporter:
             PUBLISHED: self._published,
             "dropped": self.dropped,
             SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
-            **({} if self._last_turn_off is None else {_SINCE_TURN_OFF: f"{now - self._last_turn_off:.3f}"}),
             **self.facts,
             **self._counts,
             **{f"{_REFUSED}{subject}": json.dumps(samples) for subject, samples in refused.items()},
@@ -247,8 +240,6 @@ class Health(NamedTuple):
     """Why the service is not ok."""
     since_output: float | None
     """Age of the service's last output [s]; ``None`` before the first."""
-    since_turn_off: float | None = None
-    """Age of its last ``turn_off`` [s]; ``None`` before the first."""
     host: str = ""
     """The name of its host."""
 
@@ -308,6 +299,5 @@ def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
         ok=status.level == DiagnosticStatus.OK,
         reason=status.message,
         since_output=age(values.get(SINCE_OUTPUT, "")),
-        since_turn_off=age(values.get(_SINCE_TURN_OFF, "")),
         host=status.hardware_id[:_LONGEST_HOST],
     )

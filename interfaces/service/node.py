@@ -24,7 +24,7 @@ from interfaces.service.health import HealthReporter
 from interfaces.service.parameters import Declaration, declarations
 from interfaces.service.peers import Peers, real_name
 from interfaces.service.reading import not_fresh, reading
-from interfaces.topics import ENGINES, ENGINES_SENDER, TURN_OFF, Sender, Topic
+from interfaces.topics import ENGINES, ENGINES_SENDER, Sender, Topic
 from reactive_node import ReactiveNode, stamps
 
 T = TypeVar("T")
@@ -144,8 +144,6 @@ class ServiceNode(ReactiveNode):
                 self.health.drop(name, problem)
                 return None
             self.health.count_output()
-            if topic is ENGINES and value == TURN_OFF:
-                self.health.note_turn_off()
             return message_of(value)
 
         self.publish_observable(

@@ -22,7 +22,7 @@ from deploy.supervision.system import System
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "ROS domain 0, discovery range SUBNET"),
     ],
 )
-def test_start_tells_what_is_not_as_ever(environment: dict[str, str], words: str) -> None:
+def test_start_reports_what_is_not_as_ever(environment: dict[str, str], words: str) -> None:
     assert place(environment) == words
 
 

@@ -54,3 +54,9 @@ def test_the_table_names_the_hosts_if_there_are_two() -> None:
     head, *rows = of_services(programs, {}, {"drive": "robot", "page": "operator"}).splitlines()
     assert head.split()[:2] == ["HOST", "SERVICE"]
     assert [row.split()[:2] for row in rows] == [["robot", "drive"], ["operator", "page"]]
+
+
+def test_the_table_shows_a_program_that_this_checkout_does_not_know() -> None:
+    programs = [Program("motion", "RUNNING", 7, 1.0, 0, "", "")]
+    _, row = of_services(programs, {}, {"drive": "robot"}).splitlines()
+    assert row.split()[:2] == ["-", "motion"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import subprocess
 from pathlib import Path
 
@@ -17,6 +18,7 @@ CYCLONEDDS = "tests/commands/test_fleet.py tests/security/attacks"
 SIMULATED = "tests/replay tests/simulation tests/simulation_kit"
 IGNORED = "--ignore=tests/replay"
 ONE = "tests/simulation/test_experiment.py::test"
+SMOKE = ("tests/simulation/test_minute.py", "tests/system/test_start_kill_stop.py")
 
 
 @pytest.mark.parametrize(
@@ -165,6 +167,27 @@ def test_a_missing_path_is_named_and_nothing_runs(
     assert command.main(words.split()) == (4 if missing else 0)
     assert bool(commands) != bool(missing)
     assert capsys.readouterr().err == (f"TESTS: {missing}: no such file or directory\n" if missing else "")
+
+
+def test_every_test_belongs_to_test_all_and_ci_ends_with_it() -> None:
+    folders = re.search(r"(?m)^ALL_TESTS := (.*)$", (ROOT / "Makefile").read_text())
+    assert folders
+    assert "--ignore" not in folders[1]
+    found = {path for folder in folders[1].split() for path in (ROOT / folder).rglob("test_*.py")}
+    rooms = ("services", "interfaces", "deploy", "tests")
+    assert {path for room in rooms for path in (ROOT / room).rglob("test_*.py")} == found
+    assert (ROOT / ".ci/run").read_text().endswith('make test-all\nexit "$failed"\n')
+
+
+def test_a_minute_is_for_each_recipe_a_real_arm_and_chaos() -> None:
+    default = re.search(r"(?m)^TESTS \?= ((?:.*\\\n)*.*)$", (ROOT / "Makefile").read_text())
+    assert default
+    words = f" {default[1]} "
+    for path in ("tests/component", "tests/promises", *SMOKE):
+        assert f" {path} " in words
+        assert (ROOT / path).exists()
+    assert '-m "not arm or minute" --untimed' in words
+    assert "pytest.mark.minute" in (ROOT / SMOKE[1]).read_text()
 
 
 def test_longest_files_begin_first_and_exist() -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import pytest
 from hypothesis import given
@@ -19,6 +20,7 @@ from deploy.operator.hold import (
     Release,
     heartbeats,
     holds,
+    monotonic,
     step,
 )
 from reactive_node.testing import VirtualTime
@@ -66,13 +68,20 @@ def heartbeats_of(*events: tuple[float, Event]) -> list[float]:
     """Return when the events, each with its time, give a sign of life; nonces count for 25 s."""
     scheduler = VirtualTime()
     held = holds(scheduler.hot(*events), max_age=25, now=lambda: scheduler.clock)
-    return [time for time, _ in scheduler.record(heartbeats(held), until=1000).items]
+    items = scheduler.record(heartbeats(held), until=1000).items
+    assert all(pressed is True for _, pressed in items)
+    return [time for time, _ in items]
 
 
 def test_beats_of_a_held_page_are_heartbeats() -> None:
     beats = [(time, Beat(A, time - 5)) for time in (220, 230, 240)]
     released = (250, Release(A)), (260, Beat(A, 255))
     assert heartbeats_of((210, Press(A, 205)), *beats, *released) == [210, 220, 230, 240]
+
+
+def test_events_of_another_page_are_no_heartbeats() -> None:
+    others = (215, Press(B, 214)), (216, Beat(B, 215)), (217, Release(B))
+    assert heartbeats_of((210, Press(A, 205)), *others, (220, Beat(A, 219))) == [210, 220]
 
 
 def test_queued_beats_are_no_heartbeats() -> None:
@@ -137,9 +146,23 @@ def test_nonce_is_known_while_it_is_young() -> None:
     ]
 
 
+def test_nonce_is_known_as_long_as_it_counts() -> None:
+    nonces = Nonces()
+    nonce = nonces.issue(20.0)
+    nonces.issue(20.0 + MAX_NONCE_AGE)
+    assert nonces.sent(nonce) == 20.0
+
+
 def test_nonces_take_no_more_room_with_time() -> None:
     nonces = Nonces()
     known = [nonces.issue(0.05 * tick) for tick in range(1000)]
 
     assert len({*known}) == 1000
     assert sum(nonces.sent(nonce) > -math.inf for nonce in known) <= 6
+
+
+def test_clock_of_the_nonces_counts_while_the_machine_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    awake = {time.CLOCK_MONOTONIC: 100.0, time.CLOCK_BOOTTIME: 100.0 + 8 * 3600.0}  # it slept for 8 h
+    monkeypatch.setattr(time, "clock_gettime", awake.__getitem__)
+    monkeypatch.setattr(time, "monotonic", lambda: awake[time.CLOCK_MONOTONIC])
+    assert monotonic() == 100.0 + 8 * 3600.0

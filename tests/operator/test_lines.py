@@ -14,11 +14,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from deploy.operator.engines import BY_CONTROLLER, RESTARTED, Graph
 from deploy.operator.lines import Allowance, Kind, Line, line_batches, unrepeated
 from deploy.supervision import sentinel
 from deploy.supervision.supervisord import Program
-from interfaces import topics
+from interfaces import cause, topics
+from interfaces.cause import STARTED, Cause
 from interfaces.topics import Position
 from reactive_node.stamps import Timestamp
 
@@ -29,25 +29,16 @@ Play = Callable[..., list[Line]]
 ORIGIN = datetime(1970, 1, 1, tzinfo=UTC)
 PERIOD = 0.1  # s between two batches
 AGE = 0.02  # s of a message that arrives late
-NOBODY = Graph(frozenset, set)
 
 
 @pytest.fixture
 def play(scheduler: TestScheduler) -> Play:
     """Return the lines shown until 60 s.
 
-    `late` was sent `AGE` before it arrives, `own` are own turn_offs, `graph` tells who is present, and an
-    `attached` terminal begins later than the arm.
+    `late` was sent `AGE` before it arrives.
     """
 
-    def play(
-        script: Iterable[Message],
-        *,
-        late: Any = None,
-        own: Iterable[float] = (),
-        graph: Graph = NOBODY,
-        attached: bool = False,
-    ) -> list[Line]:
+    def play(script: Iterable[Message], *, late: Any = None) -> list[Line]:
         def sent(message: Any) -> Timestamp[Any]:
             return Timestamp(message, scheduler.now - timedelta(seconds=AGE if message is late else 0))
 
@@ -56,12 +47,7 @@ def play(scheduler: TestScheduler) -> Play:
             return scheduler.create_hot_observable(arrivals).map(sent)
 
         def batches() -> Observable[list[Line]]:
-            spans = [
-                ReactiveTest.on_next(at, (scheduler.to_datetime(at), scheduler.to_datetime(at))) for at in own
-            ]
-            return line_batches(
-                seen, scheduler.create_hot_observable(spans), rx.interval(PERIOD), graph, attached=attached
-            )
+            return line_batches(seen, rx.interval(PERIOD))
 
         # RxPY takes 0 for none.
         shown = scheduler.start(batches, created=1e-9, subscribed=1e-9, disposed=60.0)
@@ -155,156 +141,61 @@ def test_conclusions_of_the_watchdog_are_shown_with_their_times(play: Play) -> N
     assert times(shown) == [1.5, 4.5, 7.5, 10.5, 13.5, 13.5, 13.5]
 
 
-@pytest.mark.parametrize("first", [13.5, 13.6])
-def test_repeated_commands_of_the_watchdog_are_hidden(play: Play, first: float) -> None:
+def test_repeated_commands_of_the_watchdog_are_hidden(play: Play) -> None:
     script = activity(topics.ALIVE, 4.5) + activity(topics.INCAPACITATED, 13.5)
-    shown = play(script + commands(topics.TURN_OFF, *(first + 0.5 * n for n in range(20))))
+    shown = play(script + turn_offs("operator_watchdog", *(13.5 + 0.5 * n for n in range(20))))
     assert texts(shown[1:]) == ASLEEP
 
 
 def test_operator_who_returned_can_fall_asleep_again(play: Play) -> None:
-    script = activity(topics.INCAPACITATED, 10, 30) + activity(topics.ALIVE, 20)
-    shown = play(script + commands(topics.TURN_OFF, 10, 10.5, 30, 30.5))
-    assert texts(shown) == [*ASLEEP, "Operator is alive", *ASLEEP]
+    script = activity(topics.INCAPACITATED, 10, 30) + activity(topics.ALIVE, 1, 20)
+    shown = play(script + turn_offs("operator_watchdog", 10, 10.5, 30, 30.5))
+    assert texts(shown)[1:] == [*ASLEEP, "Operator is alive", *ASLEEP]
 
 
 def test_every_sleep_of_an_operator_is_shown(play: Play) -> None:
     assert texts(play(activity(topics.INCAPACITATED, *range(10, 50, 5)))) == ASLEEP * 8
 
 
-def test_turn_off_of_another_node_is_attributed_to_it(play: Play) -> None:
-    script = (
-        activity(topics.ALIVE, 1, 1.5, 2) + commands(topics.TURN_ON, 1.2) + commands(topics.TURN_OFF, 1.7)
-    )
-    assert texts(play(script)) == [
+def turn_offs(node: str, *times: float) -> list[Message]:
+    sender = topics.Sender(topics.TURN_OFF, node)
+    return [*commands(topics.TURN_OFF, *times), *((time, topics.ENGINES_SENDER, sender) for time in times)]
+
+
+def test_turn_off_is_attributed_to_the_node_that_sent_it(play: Play) -> None:
+    script = activity(topics.ALIVE, 1, 1.5, 2) + commands(topics.TURN_ON, 1.2)
+    assert texts(play(script + turn_offs("terminal_7", 1.7))) == [
         "Operator is alive",
         "Turning on engines...",
         "Operator is alive",
-        "Turning off engines, as another node asked...",
+        "Turning off engines, as terminal_7 asked...",
         "Operator is alive",
     ]
 
 
-@pytest.mark.parametrize("conclusion", [topics.ALIVE, topics.INCAPACITATED])
-def test_own_turn_off_is_attributed_to_the_user(play: Play, conclusion: str) -> None:
-    script = activity(conclusion, 1) + commands(topics.TURN_OFF, 2, 3)
-    asked = "Turning off engines, as you asked..."
-    assert texts(play(script, own=[2, 3]))[-2:] == [asked, asked]
+def test_watchdog_that_commands_since_before_is_named_once(play: Play) -> None:
+    shown = play(turn_offs("operator_watchdog", 1, 1.5, 2))
+    assert texts(shown) == ["Turning off engines, as operator_watchdog asked..."]
 
 
-def test_turn_offs_without_any_conclusion_of_the_watchdog_are_one_line(play: Play) -> None:
-    assert texts(play(commands(topics.TURN_OFF, 1, 1.5, 2))) == ["Turning off engines..."]
+def causes(*given: tuple[float, Cause]) -> list[Message]:
+    return [(time, topics.ENGINES_CAUSE, cause.message(each)) for time, each in given]
 
 
-def test_engines_are_shown_when_they_change(play: Play) -> None:
-    states = {1: "off", 2: "off", 3: "on"}
-    script = [(time, topics.ENGINES_STATE, state) for time, state in states.items()]
-    assert texts(play(script)) == ["Engines are off", "Engines are on"]
-
-
-def turn_off_by(service: str, time: float, age: float) -> Message:
-    values = {"pid": "7", "published": "1", "seconds_since_output": "", "seconds_since_turn_off": str(age)}
-    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    status = DiagnosticStatus(name=f"/{service}", level=DiagnosticStatus.OK, message="", values=pairs)
-    return time, topics.DIAGNOSTICS, DiagnosticArray(status=[status])
-
-
-def states(*changes: tuple[float, str]) -> list[Message]:
-    return [(time, topics.ENGINES_STATE, state) for time, state in changes]
-
-
-OTHER = "Turning off engines, as another node asked..."
-
-
-def test_service_that_turned_off_the_engines_is_named_once(play: Play) -> None:
-    script = states((1, "on"), (2.01, "off")) + activity(topics.ALIVE, 1.5) + commands(topics.TURN_OFF, 2, 3)
-    reports = [turn_off_by("torque_guard", 2.9, 0.9), turn_off_by("torque_guard", 3.9, 0.9)]
-    shown = play(script + reports)
-    assert texts(shown)[2:] == [OTHER, "Engines are off", "torque_guard turned off the engines", OTHER]
-    assert times(shown)[4] == 2.0
-
-
-def test_service_that_turned_off_the_engines_before_is_not_named(play: Play) -> None:
-    script = states((1, "off"), (30, "on"), (31.01, "off")) + commands(topics.TURN_OFF, 31)
-    script += [turn_off_by("torque_guard", at, at - 0.5) for at in (1, 29, 31.5)]
-    assert not any("torque_guard" in text for text in texts(play(script)))
-
-
-@pytest.mark.parametrize(("off", "why"), [(2.4, BY_CONTROLLER), (3, RESTARTED)])
-def test_engines_that_go_off_without_a_command_say_why(play: Play, off: float, why: str) -> None:
-    shown = texts(play(states((1, "off"), (2, "on"), (off, "off"), (4, "off"), (5, "on"))))
-    assert shown == ["Engines are off", "Engines are on", f"Engines are off, {why}", "Engines are on"]
-
-
-def test_controller_that_was_killed_and_is_back_at_once_is_told(play: Play) -> None:
-    lives = iter([frozenset({"first"}), frozenset({"first", "second"})])
-    shown = texts(play(states((1, "on"), (1.4, "off")), graph=Graph(lambda: next(lives), set)))
-    assert shown == ["Engines are on", f"Engines are off, {RESTARTED}"]
-
-
-def test_own_turn_off_needs_no_other_name(play: Play) -> None:
-    script = states((1, "on"), (2.01, "off")) + commands(topics.TURN_OFF, 2)
-    shown = texts(play([*script, turn_off_by("operator_page", 2.5, 0.5)], own=[2]))
-    assert shown[1:] == ["Turning off engines, as you asked...", "Engines are off"]
-
-
-def test_node_without_health_is_named_when_no_service_has_sent_the_command(play: Play) -> None:
-    script = states((1, "on"), (2.01, "off")) + activity(topics.ALIVE, 1.5) + commands(topics.TURN_OFF, 2)
-    script += [alive(3, pid=7), alive(4.1, pid=7)]
-    present = Graph(frozenset, lambda: {"terminal_7", "rqt"})
-    shown = play(script, graph=present)
-    assert texts(shown)[2:] == [OTHER, "Engines are off", "rqt or terminal_7 turned off the engines"]
-    assert times(shown)[4] == 2.0
-
-
-@pytest.mark.parametrize(
-    ("own", "reports", "named"),
-    [([2], [], []), ([], [turn_off_by("guard", 2.9, 0.9)], ["guard turned off the engines"])],
-)
-def test_node_without_health_is_not_named_for_a_command_of_another_one(
-    play: Play, own: list[float], reports: list[Message], named: list[str]
-) -> None:
-    script = states((1, "on"), (2.01, "off")) + activity(topics.ALIVE, 1.5) + commands(topics.TURN_OFF, 2)
-    shown = play([*script, *reports, alive(4.1, pid=7)], own=own, graph=Graph(frozenset, lambda: {"rqt"}))
-    assert texts(shown)[4:] == named
-
-
-@pytest.mark.parametrize("conclusion", [13.5, 13.75, None])
-def test_watchdog_that_turned_off_the_engines_is_named_if_its_conclusion_is_lost(
-    play: Play, conclusion: float | None
-) -> None:
-    script = states((1, "on"), (13.6, "off")) + commands(topics.TURN_OFF, 13.5) + activity(topics.ALIVE, 4)
-    script += activity(topics.INCAPACITATED, conclusion) if conclusion else []
-    script += commands(topics.TURN_OFF, 14.55)  # repeated
-    reports = [turn_off_by("operator_watchdog", 14, 0.5), alive(16, pid=7), alive(17, pid=7)]
-    shown = texts(play([*script, *reports], graph=Graph(frozenset, lambda: {"rqt"})))
-    named = [] if conclusion else ["operator_watchdog turned off the engines"]
-    assert [text for text in shown if "turned off the engines" in text] == named
-
-
-SINCE_BEFORE = "Engines were off before this terminal began; "
-
-
-@pytest.mark.parametrize(
-    ("ages", "known"),
-    [
-        ([], "no service has sent a turn_off"),
-        ([("guard", 8.3), ("operator_page", 61.5)], "guard sent the last turn_off, 10.0 s ago"),
-    ],
-)
-def test_terminal_that_attaches_tells_who_turned_off_the_engines_before(
-    play: Play, ages: list[tuple[str, float]], known: str
-) -> None:
-    reports = [turn_off_by(name, 2.3, age) for name, age in ages] + [alive(at, pid=7) for at in (3, 4, 5)]
-    shown = play([*states((2, "off"), (2.1, "off"), (7, "on"), (8, "off")), *reports], attached=True)
-    assert texts(shown)[:2] == ["Engines are off", SINCE_BEFORE + known]
-    assert times(shown)[:3] == [2.0, 4.0, 7.0]
-    assert len(shown) == 4
-
-
-def test_terminal_that_attaches_while_the_engines_are_on_has_nothing_to_tell(play: Play) -> None:
-    script = [*states((2, "on"), (2.1, "off")), turn_off_by("guard", 2.3, 7), alive(5, pid=7)]
-    assert not any(SINCE_BEFORE in text for text in texts(play(script, attached=True)))
+def test_engines_are_shown_when_they_change_with_the_cause(play: Play) -> None:
+    given = [
+        (1.0, Cause("off", STARTED)),
+        (2.1, Cause("on", "turn_on", "terminal_7", since=0.1)),
+        (3.1, Cause("off", "turn_off", "operator_page", since=0.05)),
+        (4.0, Cause("off", "turn_off", "operator_page", refused="no operator seen yet")),
+    ]
+    shown = play(causes(*given))
+    assert texts(shown) == [
+        "Engines are off, not turned on since engine_controller started",
+        "Engines are on",
+        "Engines are off, turned off by operator_page",
+    ]
+    assert times(shown) == [1.0, 2.0, 3.05]
 
 
 def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
@@ -346,7 +237,7 @@ def test_clock_of_another_host_is_shown_when_it_is_known_and_when_that_matters(p
 
 
 def processes(time: float, restarts: int, pid: int, age: float = 0.25, host: str = "robot1") -> Message:
-    """What the sentinel tells; the process is `age` old, and there was none for 0.05 s before."""
+    """What the sentinel reports; the process is `age` old, and there was none for 0.05 s before."""
     state = "RUNNING" if pid else "BACKOFF"
     program = Program("kinematics", state, pid, age, restarts, "code 1", "", 0.05)
     (status,) = sentinel.states([program], {}, {}, "/sentinel")
@@ -372,7 +263,7 @@ DIED = "kinematics died (code 1), back after {} s".format
 
 @pytest.mark.parametrize("health", [2.9, 3.5])
 def test_death_and_return_of_a_process_are_told_with_their_times(play: Play, health: float) -> None:
-    """Whether the sentinel or the process itself tells first."""
+    """Whether the sentinel or the process itself reports first."""
     script = [processes(1, 2, pid=7), alive(1.5, pid=7), processes(3, 3, pid=8), alive(health, pid=8)]
     shown = play([*script, processes(4, 3, pid=8, age=0.9), processes(5, 3, pid=8, age=1.9)])
     assert texts(shown) == [DIED(round(health - 2.7, 1))]
@@ -408,8 +299,8 @@ def test_program_that_two_hosts_run_is_told_apart(play: Play) -> None:
 
 @pytest.mark.parametrize("age", [-1e300, 1e300, math.inf, math.nan])
 def test_report_with_an_impossible_time_is_ignored(play: Play, age: float) -> None:
-    odd = [processes(1, 0, pid=7, age=age), turn_off_by("torque_guard", 1, age)]
-    assert texts(play([*odd, *states((2, "on"))])) == ["Engines are on"]
+    odd = processes(1, 0, pid=7, age=age)
+    assert texts(play([odd, *causes((2, Cause("on", "turn_on")))])) == ["Engines are on"]
 
 
 def test_fast_lines_are_thinned_to_one_a_second(play: Play) -> None:

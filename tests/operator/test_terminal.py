@@ -49,6 +49,27 @@ with suppress(EOFError):
     while True:
         terminal.read(0.05)
 """
+# Its prompt makes room for a line, and does not come back.
+STUCK_PROGRAM = f"""
+import os, threading
+from prompt_toolkit.renderer import Renderer
+def erase(renderer):
+    os.write(1, b"stuck")
+    threading.Event().wait()
+Renderer.erase = erase
+{PROGRAM}"""
+# Keeps a line in view, which changes when something is typed.
+STATE_PROGRAM = """
+from contextlib import suppress
+from deploy.operator.terminal.display import open_display
+terminal = open_display([])
+terminal.show_state([("good", "Engines on"), ("idle", "Released")])
+with suppress(EOFError):
+    while True:
+        for typed in terminal.read(0.05):
+            terminal.show_state([("bad", typed)])
+terminal.close()
+"""
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TERM": "xterm"}
 
 
@@ -228,6 +249,12 @@ def test_closed_terminal_is_the_end_of_input(user: User) -> None:
     user.close_terminal()
 
 
+@pytest.mark.parametrize("user", [{"shell": NO_HANGUP, "program": STUCK_PROGRAM}], indirect=True)
+def test_closed_terminal_is_the_end_of_input_for_a_stuck_prompt(user: User) -> None:
+    user.await_text(b"stuck")
+    user.close_terminal()
+
+
 @pytest.mark.parametrize("redirection", ["</dev/null", "<&-"])
 def test_missing_input_ends_nothing(redirection: str) -> None:
     with subprocess.Popen(
@@ -250,3 +277,21 @@ def test_last_line_of_a_pipe_needs_no_newline(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(sys, "stdin", pipe)
         terminal = PlainLines()
         assert [terminal.read(0.0) for _ in range(3)] == [["press"], ["turn_off"], []]
+
+
+@pytest.mark.parametrize("user", [{"program": STATE_PROGRAM}], indirect=True)
+def test_state_stays_above_the_prompt_in_colours(user: User) -> None:
+    user.await_text(rb"\x1b\[0;32mEngines on\x1b\[0m \xc2\xb7 Released\x1b\[0m\r\r\n\x1b\[0m>")
+    user.type(b"one\r")
+    user.await_text(ERASE + rb"(\x1b\[0m)?> one")  # what was typed stays, without the state
+    user.await_text(rb"\x1b\[0;31;1mone\x1b\[")
+    user.type(b"\x04")
+    user.await_end()
+
+
+@pytest.mark.parametrize("user", [{"program": STATE_PROGRAM, "shell": 'NO_COLOR=1 exec "$@"'}], indirect=True)
+def test_state_has_no_colours_where_none_are_wanted(user: User) -> None:
+    user.await_text(rb"Engines on( \xc2\xb7 |\x1b\[0m \xc2\xb7 )Released")
+    assert b";32m" not in user.output
+    user.type(b"\x04")
+    user.await_end()

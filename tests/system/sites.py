@@ -24,11 +24,11 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from deploy.supervision import manifest, processes
+from deploy.supervision.processes import ROOT
 from deploy.supervision.system import System
 from interfaces import topics
 from tests.environment import user_environment
 
-ROOT = Path(__file__).parents[2]
 LIMIT = 30.0  # s for each awaited event, even on a busy machine
 LOOK = 0.1  # s between two looks at all processes, which cost some milliseconds
 STEADY = str(Path(__file__).with_name("steady.yaml"))
@@ -140,7 +140,7 @@ class Site:
         self.namespace = namespace
         self.directory = directory
         self.python = sys.executable if directory == ROOT else str(directory / ".venv" / "bin" / "python")
-        self._commands = ExitStack()
+        self.commands = ExitStack()
 
     @property
     def environment(self) -> dict[str, str]:
@@ -157,7 +157,7 @@ class Site:
 
     def begin(self, *arguments: str) -> Command:
         """Begin a command of `make`, without make."""
-        return self._begin(self._command(arguments))
+        return self._begin(self.command(arguments))
 
     def begin_command(self, *command: str) -> Command:
         return self._begin(list(command))
@@ -165,7 +165,7 @@ class Site:
     def begin_alone(self, command: list[str], environment: dict[str, str]) -> Command:
         """Begin any command with nothing but this environment."""
         begun = Command(command, environment, self.directory)
-        self._commands.callback(begun.close)
+        self.commands.callback(begun.close)
         return begun
 
     def begin_in_terminal(self, *command: str) -> Command:
@@ -178,9 +178,9 @@ class Site:
 
     def do(self, *arguments: str) -> tuple[int, str]:
         """Do a command of `make`, without make: its exit code and its output."""
-        return self.do_command(*self._command(arguments))
+        return self.do_command(*self.command(arguments))
 
-    def _command(self, arguments: tuple[str, ...]) -> list[str]:
+    def command(self, arguments: tuple[str, ...]) -> list[str]:
         """The command behind `make`; `make stop` needs no .venv."""
         if arguments == ("stop",):
             return [sys._base_executable, "-m", "deploy.commands.stop"]  # type: ignore[attr-defined]
@@ -218,7 +218,7 @@ class Site:
 
     def close(self) -> None:
         try:
-            self._commands.close()
+            self.commands.close()
         finally:
             System(self.run).stop()
 
@@ -279,10 +279,10 @@ def _set_up(directory: Path) -> None:
 
 
 class Peer:
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, name: str = "peer") -> None:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain)
-        self.node = Node("peer", context=self._context)
+        self.node = Node(name, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
 

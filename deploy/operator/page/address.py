@@ -1,4 +1,4 @@
-"""Where the page listens, and the line that tells its address to the user."""
+"""Where the page listens, and the line that shows its address to the user."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def listen(address: str, port: int, last_port: int | None = None) -> socket.sock
     ports = list(range(DEFAULT_PORT, DEFAULT_PORT + PORTS)) if port == DEFAULT_PORT else [port]
     for candidate in (last_port, *ports) if last_port else ports:
         try:
-            return socket.create_server((address, candidate))
+            return socket.create_server((address, candidate), backlog=socket.SOMAXCONN)
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
                 raise OSError(f"{address} port {candidate}: {error.strerror}") from None
@@ -58,8 +58,8 @@ def tls(address: str, certificate: str, key: str) -> ssl.SSLContext | None:
     return context
 
 
-def host_names(address: str, port: int, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the ``Host`` headers that reach the page; browsers leave out the port of the scheme.
+def host_names(address: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names by which browsers reach the page, without a port.
 
     :raises UserError: if no browser sends one of them.
     """
@@ -69,8 +69,7 @@ def host_names(address: str, port: int, names: Sequence[str]) -> tuple[str, ...]
         if not _NAME.fullmatch(name):
             characters = "ASCII letters, digits, dots, hyphens and underscores"
             raise UserError(f"names: {name!r} must consist of {characters}")
-    known = names or (("127.0.0.1", "localhost") if address == "127.0.0.1" else (address,))
-    return tuple(f"{name}:{port}" for name in known) + (tuple(known) if port in (80, 443) else ())
+    return tuple(names or (("127.0.0.1", "localhost") if address == "127.0.0.1" else (address,)))
 
 
 class AddressFile:

@@ -15,12 +15,17 @@ from websockets.protocol import Event, State
 from websockets.server import ServerProtocol
 
 from deploy.operator.page.protocol import MAX_SIZE
+from deploy.operator.page.records import Download
+from deploy.operator.page.site import is_direct
 
 CHUNK = 4096  # bytes that are read at a time
-MAX_FRAMES = 400  # of a client within a second, answers to pings included
-REQUEST_TIMEOUT = 5.0  # s
+MAX_FRAMES = 400  # of a page within a second, answers to pings included
+MAX_FIRST_FRAMES = 4  # within a second until the page has said hello
+MAX_REQUEST = 16_384  # bytes; a browser sends the cookies of all pages of the host
+REQUEST_TIMEOUT = 2.0  # s from the connection to the request, handshake of TLS included
 HELLO_TIMEOUT = 2.0  # s from the start of the WebSocket
 CLOSE_TIMEOUT = 1.0  # s
+DOWNLOAD_TIMEOUT = 10.0  # s without progress
 MAX_UNSENT = 1_000_000  # bytes; a file of the page is smaller
 BAD_REQUEST, TOO_LATE, TOO_MANY = 4400, 4408, 4429  # codes of a close
 _LIBRARY_FAILURES = (1002, 1007, 1009)  # protocol error, bad text, message too big (RFC 6455 7.4.1)
@@ -54,15 +59,17 @@ class Connection:
     ) -> None:
         """Take over a socket. Raises OSError if its client has gone already.
 
-        :param answer: returns the response to a request; ``None`` lets a WebSocket begin.
+        :param answer: returns the response to a request; ``None`` begins a WebSocket.
         :param now: the time [s], as in all methods.
         """
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.is_local = ipaddress.ip_address(client.getpeername()[0]).is_loopback
-        """Whether the client is on this machine."""
+        self.address = client.getpeername()[0]
+        """The IP address of the client."""
+        self.is_local = ipaddress.ip_address(self.address).is_loopback
+        """Whether the client is on this machine, and no proxy of others."""
         self.problem = ""
-        """What the client has done outside the protocol; empty if nothing."""
+        """How the client has violated the protocol; empty if it has not."""
         self.has_ended = False
         self.has_answered = True
         """Whether the last ping was answered."""
@@ -70,8 +77,10 @@ class Connection:
         """The time at which the connection ends, if it does not get any further [s]."""
         self._answer = answer
         self._protocol = ServerProtocol(max_size=MAX_SIZE)
-        self._frames = Allowance(MAX_FRAMES)
+        self._request_size = 0
+        self._frames = Allowance(MAX_FIRST_FRAMES)
         self._unsent = bytearray()
+        self._download: Download | None = None
         self._sends_no_more = False
         self._waits_to_write = False
         self._shakes_hands = tls is not None
@@ -93,6 +102,11 @@ class Connection:
         """The events of the selector that the connection waits for."""
         waits_to_write = self._unsent or self._waits_to_write
         return selectors.EVENT_READ | (selectors.EVENT_WRITE if waits_to_write else 0)
+
+    def admit(self) -> None:
+        """Keep the connection from now on: its client is a page."""
+        self.deadline = math.inf
+        self._frames = Allowance(MAX_FRAMES)
 
     def receive(self, now: float) -> list[str | bytes]:
         """Receive and send what is possible; return the messages that have come."""
@@ -131,7 +145,13 @@ class Connection:
     def close(self) -> None:
         self.has_ended = True
         self._unsent.clear()
+        self._end_download()
         self.socket.close()
+
+    def _end_download(self) -> None:
+        if self._download:
+            self._download.file.close()
+            self._download = None
 
     def _feed(self, data: bytes, now: float, messages: list[str | bytes]) -> None:
         if not data:
@@ -139,6 +159,12 @@ class Connection:
             self._note_problem()
             self.close()
             return
+        if self._protocol.state is State.CONNECTING:
+            self._request_size += len(data)
+            if self._request_size > MAX_REQUEST:
+                self.problem = f"a request is longer than {MAX_REQUEST} bytes"
+                self.close()
+                return
         self._protocol.receive_data(data)
         events = self._protocol.events_received()
         for event in events:
@@ -148,7 +174,10 @@ class Connection:
                 self.problem = "a client does not wait for the response to its request"
                 self.close()
             else:
-                self._protocol.send_response(self._answer(event) or self._protocol.accept(event))
+                self.is_local = self.is_local and is_direct(event)
+                response = self._answer(event) or self._protocol.accept(event)
+                self._download = response if isinstance(response, Download) else None
+                self._protocol.send_response(response)
                 self.deadline = now + HELLO_TIMEOUT
         self._note_problem()
 
@@ -182,15 +211,20 @@ class Connection:
         for data in self._protocol.data_to_send():
             self._sends_no_more = self._sends_no_more or not data
             self._unsent += data
-        if self._protocol.close_expected():
+        if self._protocol.close_expected() and not self._download:
             self.deadline = min(self.deadline, now + CLOSE_TIMEOUT)
         if self.has_ended:
             return
         try:
             while self._unsent:
                 del self._unsent[: self.socket.send(self._unsent)]
-            if self._sends_no_more:
-                self.socket.shutdown(socket.SHUT_WR)
+            if self._download:  # a piece at a time: meanwhile, others are served
+                self._unsent += self._download.next()
+                self.deadline = now + (DOWNLOAD_TIMEOUT if self._unsent else CLOSE_TIMEOUT)
+            if not self._unsent:
+                self._end_download()
+                if self._sends_no_more:
+                    self.socket.shutdown(socket.SHUT_WR)
         except _NOT_NOW:
             pass
         except OSError:

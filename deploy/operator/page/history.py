@@ -12,7 +12,7 @@ MOST = 1000  # changes
 
 
 class History:
-    """What was shown in the last minute, at each change; times are those of the scenario [s]."""
+    """The states of the last minute, at each change; times are those of the scenario [s]."""
 
     def __init__(self) -> None:
         self._changes: deque[tuple[float, Any]] = deque(maxlen=MOST)
@@ -26,7 +26,7 @@ class History:
         self._noted = time
         if not self._changes or self._changes[-1][1] != moment:
             self._changes.append((time, moment))
-        # The change before the span tells what was shown at its begin.
+        # The change before the span shows what was shown at its begin.
         while len(self._changes) > 1 and self._changes[1][0] < time - SPAN:
             self._changes.popleft()
 

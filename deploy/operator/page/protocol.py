@@ -61,7 +61,13 @@ class Process(NamedTuple):
     action: str
 
 
-Message = Hello | Press | Beat | Release | Engines | Set | FollowScenario | Process
+class Fault(NamedTuple):
+    """An error of the page's own code."""
+
+    text: str
+
+
+Message = Hello | Press | Beat | Release | Engines | Set | FollowScenario | Process | Fault
 
 
 PROGRAMS = tuple(program.name for program in manifest.everywhere())
@@ -136,5 +142,6 @@ _MESSAGES: dict[str, tuple[Callable[..., Message], dict[str, Callable[[object], 
     "engines": (Engines, {"command": _one_of((TURN_ON, TURN_OFF))}),
     "set": (Set, {"name": _one_of(LIMITS), "value": _is_number}),
     "follow_scenario": (FollowScenario, {}),
+    "fault": (Fault, {"text": lambda it: isinstance(it, str)}),
     "process": (Process, {"name": _one_of(PROGRAMS), "action": _one_of(ACTIONS)}),
 }

@@ -17,18 +17,25 @@ from deploy.operator.page.server import Request
 from deploy.operator.page.state import Change, Program, follows_scenario, refuse
 from deploy.operator.remote import ParameterChange, RemoteParameters
 from deploy.supervision import processes
-from reactive_node import ReactiveNode, stamps
-from reactive_node.stamps import Timestamp
+from reactive_node import ReactiveNode
 
 VALUE, FOLLOW_SCENARIO = "value", "follow_scenario"  # parameters of a source of the configuration
+MOST_FAULTS = 50
 SIGNALS = {"kill": signal.SIGKILL, "stop": signal.SIGSTOP}
 
 
-def engine_commands(requests: Observable[Request]) -> Observable[Timestamp[str]]:
-    """Emit the commands to the engines, each with a time before it is published."""
+def engine_commands(requests: Observable[Request]) -> Observable[str]:
+    """Emit the commands to the engines."""
     messages = requests.map(lambda request: request.message)
     commands = messages.filter(lambda it: isinstance(it, protocol.Engines))
-    return commands.map(lambda it: Timestamp(it.command, stamps.now()))
+    return commands.map(lambda it: str(it.command))
+
+
+def faults(requests: Observable[Request]) -> Observable[str]:
+    """Emit each error of a page once; the first ones, as a log is no place for a flood."""
+    messages = requests.map(lambda request: request.message)
+    texts = messages.filter(lambda it: isinstance(it, protocol.Fault)).map(lambda it: str(it.text))
+    return texts.distinct().take(MOST_FAULTS)
 
 
 class Configuration:

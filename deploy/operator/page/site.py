@@ -14,6 +14,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 SOCKET = "/socket"
+RECORDS = "/records"  # needs the token
 STATIC = Path(__file__).parent / "static"
 INDEX = "index.html"
 TYPES = {
@@ -34,8 +35,9 @@ SECURITY_HEADERS = {
 
 WRONG_HOST = (
     b"This is no address of the page. Open the one that the terminal shows.\n"
-    b"The parameter `names` of operator_page adds names of this machine.\n"
+    b"The parameter `names` of operator_page sets names of this machine, or of a proxy before it.\n"
 )
+WRONG_ORIGIN = b"This is another origin. A reverse proxy must pass on the Host of the browser.\n"
 _HOST = re.compile(r"([^:]+)(:[0-9]+)?")
 
 
@@ -43,7 +45,7 @@ class Refusal(NamedTuple):
     status: http.HTTPStatus
     reason: str
     answer: bytes = b""
-    """What its sender is told; empty for the words of the status."""
+    """The answer to its sender; empty for the words of the status."""
 
 
 class Site:
@@ -54,38 +56,47 @@ class Site:
     ) -> None:
         """Read the files: there are no others.
 
-        :param names: the accepted ``Host`` headers, port included. A name of loopback is accepted with any
-            port: it is that of a tunnel. A page of somebody else that resolves to loopback has another name.
+        :param names: the names in accepted ``Host`` headers. The port may be that of a tunnel or a reverse
+            proxy. A page of somebody else that resolves to this machine has another name.
         """
         self._token = token.encode()
         self._names = names
-        self._loopback = {name for name in map(_without_port, names) if _is_loopback(name)}
-        self._scheme = scheme
+        self._schemes = {scheme, "https"}  # a reverse proxy may end TLS
         files = {f"/static/{path.name}": (TYPES[path.suffix], path.read_bytes()) for path in folder.iterdir()}
         self._files = {"/": files[f"/static/{INDEX}"], **files}
 
     def is_token(self, text: str) -> bool:
-        """Return whether a text is the token, in a time that tells nothing about it."""
+        """Return whether a text is the token, in a time that shows nothing about it."""
         return hmac.compare_digest(text.encode(), self._token)
 
     def refusal(self, request: Request) -> Refusal | None:
         """Return why a request is refused, ``None`` if it is not."""
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
-        if len(hosts) != 1 or not self._is_ours(hosts[0]):
+        if len(hosts) != 1 or _without_port(hosts[0]) not in self._names:
             return Refusal(http.HTTPStatus.FORBIDDEN, "a request names another host", WRONG_HOST)
-        if (origins or request.path == SOCKET) and origins != [f"{self._scheme}://{hosts[0]}"]:
-            return Refusal(http.HTTPStatus.FORBIDDEN, "a request has another origin")
+        ours = [[f"{scheme}://{hosts[0]}"] for scheme in self._schemes]
+        if (origins or request.path == SOCKET) and origins not in ours:
+            return Refusal(http.HTTPStatus.FORBIDDEN, "a request has another origin", WRONG_ORIGIN)
+        if request.path.startswith(RECORDS) and not self._has_token(request):
+            return Refusal(http.HTTPStatus.FORBIDDEN, "a request has no token")
         if request.method != "GET":
             return Refusal(http.HTTPStatus.METHOD_NOT_ALLOWED, "a request is no GET")
         return None
 
-    def _is_ours(self, host: str) -> bool:
-        return host in self._names or _without_port(host) in self._loopback
+    def _has_token(self, request: Request) -> bool:
+        found = request.headers.get_all("Authorization")
+        return len(found) == 1 and self.is_token(found[0].removeprefix("Bearer "))
 
     def file(self, path: str) -> Response:
         if path in self._files:
             return respond(http.HTTPStatus.OK, *self._files[path])
         return respond(http.HTTPStatus.NOT_FOUND)
+
+
+def is_direct(request: Request) -> bool:
+    """Return whether a request to this machine has come from it, and not by a proxy."""
+    is_forwarded = any(it == "forwarded" or it.startswith("x-forwarded-") for it in request.headers)
+    return not is_forwarded and all(_is_loopback(_without_port(it)) for it in request.headers.get_all("Host"))
 
 
 def respond(status: http.HTTPStatus, kind: str = "text/plain; charset=utf-8", body: bytes = b"") -> Response:

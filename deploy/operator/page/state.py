@@ -1,9 +1,8 @@
-"""What the pages show: from the topics of an arm to a state."""
+"""The state that the pages show, from the topics of an arm."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
@@ -11,26 +10,26 @@ from typing import Any, NamedTuple
 import reactivex as rx
 from reactivex import Observable
 
-from deploy.operator.engines import BY_COMMAND, BY_PAGE, BY_WATCHDOG, OLDER, TOGETHER, Engines, Graph
+from deploy.operator.engines import WATCHDOG, Engines
 from deploy.operator.hold import Hold
+from deploy.operator.holder import Holder
+from deploy.operator.strikes import Operator
 from deploy.supervision import manifest
 from deploy.supervision.sentinel import reported
-from interfaces import topics
+from interfaces import cause, topics
+from interfaces.limits import newest
 from interfaces.service.health import healths
-from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
-from reactive_node import stamps
+from interfaces.topics import INCAPACITATED, TURN_OFF
 from reactive_node.stamps import Timestamp
 from services import engine_controller, operator_watchdog
 
 PROGRAMS = tuple(program.name for program in manifest.everywhere())
-ENGINE_CONTROLLER = "engine_controller"
-ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is taken for that beat
+UNHEARD = 0.3  # s without news, after which a value is not known any more: the contract allows gaps of 0.25 s
 SAMPLE_PERIOD = 1 / 30  # s between two samples of the trace
+STILL_PERIOD = 0.1  # s, the same while the arm stands
 BEAT = "beat"  # the request of a page that is held
 MAX_SAMPLES, MAX_LINES = 1800, 400  # those of a minute, for a page that opens later
 MAX_REFUSALS = 20  # that are kept for a page that is slow
-
-_REFUSED = re.compile(r"turn_on refused: ([^;]*)")
 
 Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
 """Gives the messages of a topic with their source times."""
@@ -42,9 +41,11 @@ class Clock(NamedTuple):
     now: Callable[[], float]
     """The clock of the nonces [s]."""
     age: Callable[[datetime], float]
-    """The age of a stamp [s]."""
+    """The age of a source time [s]."""
     elapsed: Callable[[], float]
     """The time since the origin of the scenario [s]."""
+    stamp_age: Callable[[int], float]
+    """The age of the stamp of a header [ns], by ROS time [s]."""
 
 
 class Program(NamedTuple):
@@ -59,8 +60,8 @@ class Program(NamedTuple):
     """When the program has reported its health [s]."""
     ok: bool = False
     reason: str = ""
-    since_output: float | None = None
-    """The age of its last output at that time [s]."""
+    output: float | None = None
+    """When its last output was, as time since the origin of the scenario [s]."""
 
 
 class Recent(NamedTuple):
@@ -86,31 +87,37 @@ class Recent(NamedTuple):
 
 class Arm(NamedTuple):
     configuration: Mapping[str, float] = {}
+    heard: Mapping[str, float] = {}
+    """When each value of the configuration came."""
     position: tuple[float, float] | None = None
+    positioned: float = -math.inf
+    """When the position came."""
     speed: float | None = None
+    sped: float = -math.inf
+    """When the speed came: it is silent while a value of the configuration is not known."""
     samples: Recent = Recent()
-    """The trace: time since the origin of the scenario [s], x, y and speed."""
+    """The trace: time since the origin of the scenario [s], x, y, speed and the joints' angles."""
     sampled: float = -math.inf
 
+    def fresh_speed(self, now: float) -> float | None:
+        return self.speed if now - self.sped <= UNHEARD else None
 
-class Operator(NamedTuple):
-    seen: float = -math.inf
-    """When the operator was seen."""
-    activity: str | None = None
-    strikes_left: int | None = None
+    def unheard(self, now: float) -> list[str]:
+        """Return the values of the configuration, and `position`, that are known no more at a time [s].
+
+        A value that stands has no news, but the speed has. A position stands while the configuration does.
+        """
+        names = [name for name, heard in self.heard.items() if now - max(heard, self.sped) > UNHEARD]
+        changed = max(self.heard.values(), default=-math.inf)
+        is_behind = changed - self.positioned > UNHEARD and now - self.positioned > UNHEARD
+        return [*names, *(["position"] if names or is_behind else [])]
 
 
 class Hands(NamedTuple):
     hold: Hold = Hold()
     """The page that holds it."""
-    beaten: float = -math.inf
-    """When the last beat of a page counted; a release does not change it."""
-    heartbeat: float = -math.inf
-    """When a heartbeat came that is not of a page."""
-    pressed: bool = False
-    """Whether the virtual switch was pressed by hand."""
-    at_terminal: bool = False
-    """Whether a hand at a terminal sends heartbeats."""
+    holder: Holder = Holder()
+    """The other holder of the switch."""
 
 
 class PageState(NamedTuple):
@@ -120,6 +127,10 @@ class PageState(NamedTuple):
     """The strike that turns the engines off."""
     max_presence_age: float = engine_controller.DEFAULTS.max_presence_age
     """How long ago the operator may have been seen to count as seen [s]."""
+    silence: float = operator_watchdog.DEFAULTS.silence
+    """A silence of this length is a strike [s]."""
+    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
+    """How long after the operator was seen the controller turns the engines off [s]."""
     arm: Arm = Arm()
     by_hand: frozenset[str] = frozenset()
     """The sources of the configuration that were set by hand."""
@@ -128,8 +139,6 @@ class PageState(NamedTuple):
     engines: Engines = Engines()
     programs: Mapping[tuple[str, str], Program] = {}
     """By host and name."""
-    heard_since: float = -math.inf
-    """Since when the programs are heard."""
     loopback_is_up: bool = True
     lines: Recent = Recent()
     """The lines of the terminal."""
@@ -146,21 +155,17 @@ def page_states(changes: Observable[Change], initial: PageState) -> Observable[P
 
 def always(
     seen: Seen,
-    engines: Observable[Timestamp[str]],
     watchdogs: Observable[bool],
-    graph: Graph,
     clock: Clock,
 ) -> Observable[Change]:
-    """The changes that count even while no page is open: a page that opens later shows strikes and reasons.
+    """The changes that count even while no page is open: a page that opens later shows strikes.
 
-    :param engines: the states of the engines.
     :param watchdogs: emits for each operator watchdog that appears, whether its strikes are known to begin.
     """
     return rx.merge(
         watchdogs.map(lambda begins: lambda state: _new_watchdog(state, begins)),
         _changes(seen(topics.OPERATOR_ACTIVITY), _activity, clock),
-        _changes(seen(topics.ENGINES), _command(graph), clock),
-        _changes(engines, _engines(graph), clock),
+        _changes(seen(topics.ENGINES_SENDER), _command, clock),
     )
 
 
@@ -171,11 +176,14 @@ def while_open(seen: Seen, lines: Observable[Any], namespace: str, clock: Clock)
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
     """
     return rx.merge(
-        rx.of(lambda state: _forget(state, clock.now())),
+        rx.of(_forget),
         *(_changes(seen(topic), _configuration(name), clock) for name, topic in topics.CONFIGURATION.items()),
         _changes(seen(topics.EFFECTOR_POSITION), _position, clock),
         _changes(seen(topics.EFFECTOR_TWIST), _speed, clock),
         _changes(seen(topics.OPERATOR_HEARTBEAT), _heartbeat, clock),
+        _changes(seen(topics.OPERATOR_HAND), _hand, clock),
+        _changes(seen(topics.ENGINES_STATE), _engines, clock),
+        _changes(seen(topics.ENGINES_CAUSE), _cause, clock),
         _changes(seen(topics.OPERATOR_PRESENCE), _presence, clock),
         _changes(seen(topics.DIAGNOSTICS), _diagnostics(namespace.rstrip("/")), clock),
         lines.map(lambda batch: lambda state: _lines(state, batch, clock)),
@@ -188,13 +196,12 @@ def _changes(
     return messages.map(lambda message: lambda state: change(state, message, clock))
 
 
-def _forget(state: PageState, now: float) -> PageState:
+def _forget(state: PageState) -> PageState:
     return state._replace(
-        heard_since=now,
         arm=Arm(samples=state.arm.samples.forget()),
         operator=state.operator._replace(seen=-math.inf),
-        hands=state.hands._replace(heartbeat=-math.inf),
-        engines=state.engines._replace(refused=None),
+        hands=Hands(state.hands.hold),
+        engines=Engines(),
         programs={},
         lines=state.lines.forget(),
     )
@@ -206,32 +213,46 @@ def _forget(state: PageState, now: float) -> PageState:
 def _configuration(name: str) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
         configuration = {**state.arm.configuration, name: message.value}
-        return state._replace(arm=state.arm._replace(configuration=configuration))
+        heard = {**state.arm.heard, name: clock.now()}
+        return state._replace(arm=state.arm._replace(configuration=configuration, heard=heard))
 
     return change
 
 
 def _position(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
     stamp, x, y, _ = message.value
-    arm, now = state.arm._replace(position=(x, y)), clock.now()
+    now = clock.now()
+    arm = state.arm._replace(position=(x, y), positioned=now)
     if now - arm.sampled >= SAMPLE_PERIOD:
-        at = clock.elapsed() - clock.age(stamps.from_nanoseconds(stamp))
-        samples = arm.samples.add([(round(at, 3), x, y, arm.speed)], MAX_SAMPLES)
-        arm = arm._replace(samples=samples, sampled=now)
+        arm = _sample(arm, clock.elapsed() - clock.stamp_age(stamp), now)
     return state._replace(arm=arm)
 
 
 def _speed(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    return state._replace(arm=state.arm._replace(speed=message.value.speed))
+    now = clock.now()
+    arm = state.arm._replace(speed=message.value.speed, sped=now)
+    if now - arm.sampled >= STILL_PERIOD:
+        arm = _sample(arm, clock.elapsed(), now)
+    return state._replace(arm=arm)
+
+
+def _sample(arm: Arm, at: float, now: float) -> Arm:
+    x, y = arm.position if arm.position and "position" not in arm.unheard(now) else (None, None)
+    joints = (arm.configuration.get(name) for name in ("theta1", "theta2"))
+    samples = arm.samples.add([(round(at, 3), x, y, arm.fresh_speed(now), *joints)], MAX_SAMPLES)
+    return arm._replace(samples=samples, sampled=now)
 
 
 # The operator
 
 
 def _heartbeat(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    now = clock.now()
-    is_of_page = now - state.hands.beaten < ECHO
-    return state if is_of_page else state._replace(hands=state.hands._replace(heartbeat=now))
+    return state._replace(hands=state.hands._replace(holder=state.hands.holder.beats(clock.now())))
+
+
+def _hand(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    holder = state.hands.holder.reports(message.value.frame_id, clock.now())
+    return state._replace(hands=state.hands._replace(holder=holder))
 
 
 def _presence(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
@@ -240,57 +261,31 @@ def _presence(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
 
 
 def _new_watchdog(state: PageState, begins: bool) -> PageState:
-    left = state.strikes if begins else None
-    return state._replace(operator=state.operator._replace(activity=None, strikes_left=left))
+    return state._replace(operator=state.operator.begins_again(state.strikes if begins else None))
 
 
 def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    activity, (seen, before, left) = message.value, state.operator
-    if activity == MISSED and left is not None:
-        left = max(0, left - 1)
-    elif activity == INCAPACITATED:
-        left = 0
-    elif activity == ALIVE and before == INCAPACITATED:
-        left = state.strikes
-    state = state._replace(operator=Operator(seen, activity, left))
-    return _explain(state, BY_WATCHDOG, clock) if activity == INCAPACITATED else state
+    return state._replace(operator=state.operator.concludes(message.value, state.strikes, clock.now()))
 
 
 # The engines
 
 
-def _command(graph: Graph) -> Callable[[PageState, Any, Clock], PageState]:
-    def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        if message.value != TURN_OFF:
-            return state
-        if clock.now() - state.engines.own_turn_off < TOGETHER:
-            return _explain(state, BY_PAGE, clock)
-        operator = state.operator
-        if operator.activity is None and state.engines.since_when == OLDER:
-            # A watchdog that is older than this process repeats the command of an earlier conclusion.
-            operator = operator._replace(activity=INCAPACITATED, strikes_left=0)
-        cause = BY_WATCHDOG if operator.activity == INCAPACITATED else BY_COMMAND
-        after = _explain(state._replace(operator=operator), cause, clock)
-        if cause == BY_COMMAND and after.engines is not state.engines:
-            after = after._replace(engines=after.engines._replace(strangers=tuple(sorted(graph.strangers()))))
-        return after
-
-    return change
+def _command(state: PageState, message: Timestamp[topics.Sender], clock: Clock) -> PageState:
+    """The watchdog commands only while the operator is incapacitated: it may be older than this process."""
+    if message.value != (TURN_OFF, WATCHDOG) or state.operator.activity is not None:
+        return state
+    return state._replace(operator=state.operator._replace(activity=INCAPACITATED, strikes_left=0))
 
 
-def _explain(state: PageState, cause: str, clock: Clock) -> PageState:
-    return state._replace(engines=state.engines.explain(cause, clock.now()))
+def _engines(state: PageState, message: Timestamp[str], clock: Clock) -> PageState:
+    return state._replace(engines=state.engines.reports(message.value, clock.now()))
 
 
-def _engines(graph: Graph) -> Callable[[PageState, Any, Clock], PageState]:
-    def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        before = state.engines
-        engines = before.report(message.value, clock.now(), graph.controllers)
-        if engines.off_since != before.off_since:
-            engines = engines._replace(off_at=round(clock.elapsed(), 1))
-        return state._replace(engines=engines)
-
-    return change
+def _cause(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    found, age = cause.read(message.value), clock.age(message.timestamp)
+    since = round(clock.elapsed() - age - found.since, 1)
+    return state._replace(engines=state.engines.explains(found, clock.now() - age, since))
 
 
 # The processes
@@ -298,23 +293,21 @@ def _engines(graph: Graph) -> Callable[[PageState, Any, Clock], PageState]:
 
 def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        programs, now, engines = dict(state.programs), clock.now(), state.engines
+        programs, now = dict(state.programs), clock.now()
         for name, health in healths(message.value, namespace).items():
             if name in PROGRAMS:
+                age = health.since_output
+                output = None if age is None else round(clock.elapsed() - age, 2)
                 programs[health.host, name] = programs.get((health.host, name), Program())._replace(
-                    heard=now, ok=health.ok, reason=health.reason, since_output=health.since_output
+                    heard=now, ok=health.ok, reason=health.reason, output=output
                 )
-            if health.since_turn_off is not None:
-                engines = engines.name(name, now - health.since_turn_off)
-            if name == ENGINE_CONTROLLER and (refusal := _REFUSED.search(health.reason)):
-                engines = engines._replace(refused=(now, refusal[1].strip()))
         for process in reported(message.value, namespace):
             if process.name in PROGRAMS:
                 key = process.host, process.name
                 programs[key] = programs.get(key, Program())._replace(
                     state=process.state, pid=process.pid, restarts=process.restarts, observed=now
                 )
-        return state._replace(programs=programs, engines=engines)
+        return state._replace(programs=newest(programs))
 
     return change
 
@@ -338,8 +331,7 @@ def held(hold: Hold) -> Change:
     """The switch after an event of a page."""
 
     def change(state: PageState) -> PageState:
-        beaten = max(state.hands.beaten, hold.seen)
-        state = state._replace(hands=state.hands._replace(hold=hold, beaten=beaten))
+        state = state._replace(hands=state.hands._replace(hold=hold))
         if hold.ended:
             page, why = hold.ended
             return refuse(page, BEAT, why)(state)
@@ -351,20 +343,6 @@ def held(hold: Hold) -> Change:
 def refuse(page: str, request: str, reason: str) -> Change:
     refusal = (page, request, reason)
     return lambda state: state._replace(refusals=state.refusals.add([refusal], MAX_REFUSALS))
-
-
-def turned_off(now: float) -> Change:
-    return lambda state: state._replace(engines=state.engines._replace(own_turn_off=now))
-
-
-def pressed(pressed: bool) -> Change:
-    """The virtual switch is pressed or released by hand."""
-    return lambda state: state._replace(hands=state.hands._replace(pressed=pressed))
-
-
-def held_at_terminal(at_terminal: bool) -> Change:
-    """A hand at a terminal begins or ends to send heartbeats."""
-    return lambda state: state._replace(hands=state.hands._replace(at_terminal=at_terminal))
 
 
 def connected(loopback_is_up: bool) -> Change:

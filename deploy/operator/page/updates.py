@@ -11,9 +11,8 @@ from deploy.operator.page.state import BEAT, PROGRAMS, Clock, PageState, Program
 from deploy.supervision import manifest, sentinel
 from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN
-from interfaces.topics import OFF, ON
+from interfaces.topics import ON
 
-HEARTBEAT_VISIBLE = 0.25  # s for which a heartbeat shows that the switch is held
 REFUSAL_VISIBLE = 10.0  # s
 HEALTH_TIMEOUT = sentinel.Parameters().health_timeout  # a sentinel that waits longer hides no silence
 SILENT_CONTROLLER = "the engine controller is silent, so the drive stops the engines"
@@ -25,7 +24,8 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
     return {
         "arm": {name: arm.configuration.get(name) for name in topics.CONFIGURATION},
         "position": {"x": arm.position[0], "y": arm.position[1]} if arm.position else None,
-        "speed": arm.speed,
+        "speed": arm.fresh_speed(now),
+        "unheard": arm.unheard(now),
         **moment(state, page, now),
         "sources": {name: "hand" if name in state.by_hand else "scenario" for name in LIMITS},
         "processes": [_row(name, state, now) for name in PROGRAMS],
@@ -36,11 +36,14 @@ def moment(state: PageState, page: str, now: float) -> dict[str, Any]:
     """Return the part of a view that the page draws over time."""
     operator, hands, engines = state.operator, state.hands, state.engines
     holder = hands.hold.holder(now)
-    is_beating = now - hands.heartbeat <= HEARTBEAT_VISIBLE
-    by = "terminal" if hands.pressed or hands.at_terminal else "scenario"
     age = now - operator.seen
     is_reported = now - engines.reported <= RENEWED
-    refused = engines.refused[1] if engines.refused and now - engines.refused[0] <= REFUSAL_VISIBLE else None
+    cause = engines.known if is_reported else None
+    refused = cause.refused or None if cause and now - engines.explained <= REFUSAL_VISIBLE else None
+    by = (
+        ("this_page" if holder == page else "other_page") if holder else hands.holder.name(now, manifest.PAGE)
+    )
+    is_held = by is not None
     return {
         "operator": {
             "seen": age <= state.max_presence_age,
@@ -49,16 +52,31 @@ def moment(state: PageState, page: str, now: float) -> dict[str, Any]:
             "strikes_left": operator.strikes_left,
         },
         "switch": {
-            "held": bool(holder) or is_beating,
-            "by": ("this_page" if holder == page else "other_page") if holder else by if is_beating else None,
+            "held": is_held,
+            "by": by or None,
         },
         "engines": {
             "state": engines.state if is_reported else None,
-            "why": _why(state, now) if is_reported else SILENT_CONTROLLER,
-            "since": engines.off_at if is_reported and engines.state == OFF else None,
+            "why": cause.words if cause else "" if is_reported else SILENT_CONTROLLER,
+            "since": engines.since if cause else None,
             "refused": refused,
+            "stops_in": _stops_in(state, now, is_held) if is_reported and engines.state == ON else None,
         },
     }
+
+
+def _stops_in(state: PageState, now: float, is_held: bool) -> float | None:
+    """Return how long the engines stay on if nobody holds from now on, and nothing dies [s].
+
+    ``None`` if that is not known.
+    """
+    operator = state.operator
+    ends = []
+    if operator.strikes_left is not None and math.isfinite(operator.concluded):
+        ends.append((now if is_held else operator.concluded) + operator.strikes_left * state.silence)
+    if is_held or math.isfinite(operator.seen):
+        ends.append((now if is_held else operator.seen) + state.presence_timeout)
+    return round(max(0.0, min(ends) - now), 1) if ends else None
 
 
 def lasting(state: PageState, now: float) -> dict[str, Any]:
@@ -66,10 +84,6 @@ def lasting(state: PageState, now: float) -> dict[str, Any]:
     shown = moment(state, "", now)
     operator = {**shown["operator"], "age": None}
     return {"switch": shown["switch"], "operator": operator, "engines": {"state": shown["engines"]["state"]}}
-
-
-def _why(state: PageState, now: float) -> str:
-    return "" if state.engines.state == ON else state.engines.reason(now, state.heard_since)
 
 
 def _row(name: str, state: PageState, now: float) -> dict[str, Any]:
@@ -88,18 +102,15 @@ def _row(name: str, state: PageState, now: float) -> dict[str, Any]:
 
 
 def _row_of(name: str, program: Program, now: float, loopback_is_up: bool) -> dict[str, Any]:
-    # The health of the sentinel, which tells that the loopback interface is down, cannot be heard then.
+    # The health of the sentinel, which reports that the loopback interface is down, cannot be heard then.
     problem = f"loopback: {LOOPBACK_DOWN}" if name == manifest.sentinel() and not loopback_is_up else ""
     silence = now - program.heard
-    since_output = program.since_output
-    if silence > HEALTH_TIMEOUT and since_output is not None:
-        since_output = math.floor(since_output + silence)
     return {
         "name": name,
         "state": program.state if now - program.observed <= HEALTH_TIMEOUT else "UNKNOWN",
         "pid": program.pid,
         "restarts": program.restarts,
-        "since_output": since_output,
+        "output": program.output,
         "ok": program.ok and silence <= HEALTH_TIMEOUT and not problem,
         "health": problem or _health(program, silence),
     }
@@ -112,7 +123,7 @@ def _health(program: Program, silence: float) -> str:
 
 
 class Updates:
-    """The messages to one page: each tells what has changed since the last one."""
+    """The messages to one page: each shows what has changed since the last one."""
 
     def __init__(self, page: str, clock: Clock) -> None:
         self._page = page

@@ -11,8 +11,14 @@ from deploy.operator.terminal.plain import PlainLines
 
 
 class Display(Protocol):
+    takes_input: bool
+    """Whether somebody can still type."""
+
     def show(self, lines: Iterable[str]) -> None:
         """Print lines; never block."""
+
+    def show_state(self, parts: Sequence[tuple[str, str]]) -> None:
+        """Keep a line with these parts in view, if that is possible: how each looks, and its text."""
 
     def read(self, seconds: float) -> list[str]:
         """Return typed lines as soon as there are any; wait at most so long [s]. EOFError after Ctrl-D."""

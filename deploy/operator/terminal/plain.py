@@ -6,7 +6,7 @@ import os
 import select
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from deploy.operator.output import say
 
@@ -15,6 +15,7 @@ class PlainLines:
     def __init__(self) -> None:
         """Read standard input, unless it is closed."""
         self._input = None if sys.stdin is None else sys.stdin.fileno()
+        self.takes_input = self._input is not None
         self._is_terminal = self._input is not None and os.isatty(self._input)  # after a hang-up, no
         self._typed = b""
 
@@ -22,6 +23,9 @@ class PlainLines:
         """Print lines; drop those for which a pipe or terminal has no room."""
         for line in lines:
             say(line)
+
+    def show_state(self, parts: Sequence[tuple[str, str]]) -> None:
+        """Nothing: a line that changes would fill a file or a pipe."""
 
     def read(self, seconds: float) -> list[str]:
         if self._input is None:
@@ -32,11 +36,13 @@ class PlainLines:
         try:
             typed = os.read(self._input, 1024)
         except OSError:  # the terminal belongs to another job now
+            self.takes_input = False
             time.sleep(seconds)
             return []
+        self.takes_input = bool(typed)
         if not typed:
             self._input = None
-            if self._is_terminal:  # the end of a file or a pipe means nothing
+            if self._is_terminal:  # the end of a file or a pipe ends only what needs a hand
                 raise EOFError
             typed = b"\n" if self._typed else b""  # which the last line may lack
         *lines, self._typed = (self._typed + typed).split(b"\n")

@@ -22,7 +22,8 @@ from websockets.typing import Origin
 from websockets.uri import parse_uri
 
 from deploy.operator import hold
-from deploy.operator.page import server
+from deploy.operator.page import address, server
+from deploy.operator.page.records import Records
 from deploy.operator.page.site import Site
 from deploy.operator.page.state import Clock, PageState
 
@@ -35,17 +36,19 @@ class Arm:
         self.received: queue.SimpleQueue[server.Event] = queue.SimpleQueue()
         self.failures: list[Exception] = []
         self.state = PageState()
-        listener = socket.create_server(("127.0.0.1", 0))
+        self.records = files.with_name(f"{files.name}-records")
+        listener = address.listen("127.0.0.1", 0)
         self.port = listener.getsockname()[1]
         self.host = f"127.0.0.1:{self.port}"
         self.origin = f"{scheme}://{self.host}"
         self._server = server.PageServer(
             listener,
-            Site(TOKEN, (self.host, f"localhost:{self.port}"), scheme, files),
+            Site(TOKEN, ("127.0.0.1", "localhost", "arm.example"), scheme, files),
+            Records(self.records, lambda: 1.25),
             welcome={"strikes": 3},
             receive=self.received.put,
             newest=lambda: self.state,
-            clock=Clock(hold.monotonic, lambda stamp: 0.0, lambda: 1.25),
+            clock=Clock(hold.monotonic, lambda stamp: 0.0, lambda: 1.25, lambda stamp: 0.0),
             fail=self.failures.append,
             tls=tls,
         )
@@ -118,7 +121,7 @@ def end(page: ClientConnection) -> ConnectionClosed:
 
 
 class SleepyPage:
-    """A page that reads, and answers pings, only when it is told to."""
+    """A page that reads, and answers pings, only when the test asks for it."""
 
     def __init__(self, arm: Arm, tls: ssl.SSLContext | None = None) -> None:
         self._socket = socket.create_connection(("127.0.0.1", arm.port), timeout=0.2)
@@ -188,7 +191,7 @@ class Hand:
     """A page whose button a thread holds, without the safeguards of the real page."""
 
     def __init__(self, line: str, tls: ssl.SSLContext | None = None, *, link: Link | None = None) -> None:
-        """:param line: the line that tells the address of the page."""
+        """:param line: the line that shows the address of the page."""
         origin, _, token = line.removeprefix("The page: ").partition("/#")
         self.shown: dict[str, Any] = {}
         self.refused: list[Any] = []

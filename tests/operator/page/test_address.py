@@ -11,6 +11,7 @@ from deploy.operator.page import address
 from deploy.operator.page.address import AddressFile, host_names, listen, tls
 from deploy.supervision.run_directory import PAGE_FILE
 from interfaces.service import UserError
+from tests.ports import free_port
 
 LINE = "The page: http://127.0.0.1:8650/#tok-en_1"
 
@@ -22,8 +23,7 @@ def taken() -> Iterator[int]:
 
 
 def test_port_that_was_asked_for_is_used(taken: int) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     with listen("127.0.0.1", port) as listener:
         assert listener.getsockname() == ("127.0.0.1", port)
 
@@ -80,20 +80,19 @@ def test_bad_certificate_is_reported(tmp_path: Path) -> None:
 
 
 def test_host_names_are_exact() -> None:
-    assert host_names("127.0.0.1", 8642, []) == ("127.0.0.1:8642", "localhost:8642")
-    assert host_names("0.0.0.0", 8642, ["arm.example"]) == ("arm.example:8642",)
-    assert host_names("0.0.0.0", 443, ["arm.example"]) == ("arm.example:443", "arm.example")
+    assert host_names("127.0.0.1", []) == ("127.0.0.1", "localhost")
+    assert host_names("0.0.0.0", ["arm.example"]) == ("arm.example",)
 
 
 @pytest.mark.parametrize("name", ["küche.local", "arm.example:8642", "https://arm.example"])
 def test_name_that_no_browser_sends_is_refused(name: str) -> None:
     with pytest.raises(UserError, match=f"^names: '{name}' must consist of ASCII letters"):
-        host_names("0.0.0.0", 8642, ["arm.example", name])
+        host_names("0.0.0.0", ["arm.example", name])
 
 
 def test_address_of_all_networks_needs_names() -> None:
     with pytest.raises(UserError, match=r"^names: must be the names of this machine in browsers"):
-        host_names("0.0.0.0", 8642, [])
+        host_names("0.0.0.0", [])
 
 
 def test_restarted_process_keeps_port_and_token(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 
-from deploy.operator.engines import RESTARTED
 from deploy.supervision.manifest import PAGE
 from deploy.supervision.system import System
 from interfaces import topics
@@ -152,6 +151,9 @@ def test_engines_go_off_in_time_when_the_hand_is_gone(hand: Hand, observer: Obse
     assert hand.shown["operator"]["strikes_left"] == 0
 
 
+STARTED = "not turned on since engine_controller started"
+
+
 def test_killed_controller_is_the_reason_that_the_engines_are_off(
     hand: Hand, observer: Observer, module_site: Site
 ) -> None:
@@ -161,7 +163,7 @@ def test_killed_controller_is_the_reason_that_the_engines_are_off(
     observer.until(lambda: hand.shown["engines"]["state"] == ON)
     os.kill(module_site.members["engine_controller"], signal.SIGKILL)
     observer.until(lambda: hand.shown["engines"]["state"] == OFF)
-    assert hand.shown["engines"]["why"] == RESTARTED
+    observer.until(lambda: hand.shown["engines"]["why"] == STARTED)
 
 
 def test_closed_page_is_released(address: str, observer: Observer) -> None:
@@ -236,7 +238,7 @@ def test_hand_survives_the_death_of_other_programs(hand: Hand, observer: Observe
         observer.watch(1.0)
         gaps = [later - earlier for earlier, later in itertools.pairwise(observer.after(killed - 0.2))]
         assert max(gaps) <= 0.25, program
-        observer.until(lambda: hand.shown["switch"]["by"] == "this_page")  # a new switch tells it again
+        observer.until(lambda: hand.shown["switch"]["by"] == "this_page")  # a new switch reports it again
 
 
 def test_page_kills_and_stops_processes(hand: Hand, observer: Observer, module_site: Site) -> None:

@@ -8,28 +8,31 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.context import Context
 from rclpy.parameter import Parameter
+from reactivex import Observable
 from reactivex.subject import Subject
 from std_msgs.msg import Bool, Header, String
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from deploy.operator import hold, operator_page, remote
-from deploy.operator.engines import RESTARTED
+from deploy.operator import hand, hold, operator_page, remote
 from deploy.operator.hand import Hand
 from deploy.operator.page.server import UPDATE_PERIOD
-from deploy.operator.switch import ECHO
+from deploy.operator.remote import ParameterChange, parameter_changes
 from deploy.supervision.run_directory import PAGE_FILE
 from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION
 from reactive_node import ReactiveNode, stamps
-from services import config_publisher, dead_mans_switch
+from services import config_publisher, dead_mans_switch, engine_controller
+from tests.ports import free_port
 
 SpinUntil = Callable[..., None]
 
@@ -72,7 +75,7 @@ class Clock:
 
 
 class Page:
-    """A page in a test: it beats while it is held, and knows what it was told last."""
+    """A page in a test: it beats while it is held, and knows what it received last."""
 
     def __init__(self, connection: ClientConnection) -> None:
         self.welcome: dict[str, Any] = {}
@@ -118,16 +121,12 @@ class World:
     ) -> None:
         assert isinstance(hold.monotonic, Clock)
         self._clock = hold.monotonic
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            port = free.getsockname()[1]
-        overrides = {"port": port, "settings": str(folder)} | options
+        overrides = {"port": free_port(), "settings": str(folder)} | options
         self.program = self.service(make_node, "operator_page", operator_page.wire, **overrides)
         self.switch = self.service(make_node, "dead_mans_switch", dead_mans_switch.wire, rate=20.0)
         self.l1 = self.service(
             make_node, "config_l1", lambda node: config_publisher.wire(node, CONFIGURATION["l1"])
         )
-        self.takes = 0
-        self.switch.add_post_set_parameters_callback(self._count_take)
         self.folder = folder
         self.heartbeats: list[float] = []
         self.commands: list[str] = []
@@ -153,9 +152,6 @@ class World:
 
     def _on_heartbeat(self, message: Bool) -> None:
         self.heartbeats.append(time.monotonic())
-
-    def _count_take(self, _: Any) -> None:
-        self.takes += 1
 
     def until(self, condition: Callable[[], object]) -> None:
         def lives() -> bool:
@@ -205,6 +201,18 @@ class World:
 @pytest.fixture(autouse=True)
 def _clock(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hold, "monotonic", Clock())
+
+
+@pytest.fixture(autouse=True)
+def heard(monkeypatch: pytest.MonkeyPatch) -> list[ParameterChange]:
+    """What a terminal has heard of the switch: it lets go if it hears of another hand after a press."""
+    heard: list[ParameterChange] = []
+
+    def changes(events: Observable[Any], namespace: str) -> Observable[ParameterChange]:
+        return parameter_changes(events, namespace).do_action(heard.append)
+
+    monkeypatch.setattr(hand, "parameter_changes", changes)
+    return heard
 
 
 @pytest.fixture
@@ -280,7 +288,7 @@ def test_second_page_is_refused_while_the_first_holds(world: World) -> None:
 def test_press_on_a_page_takes_the_switch_from_the_parameter(world: World) -> None:
     world.set_pressed(True)
     with world.page() as page:
-        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "dead_mans_switch"})
         page.press()
         world.until(lambda: world.switch.get_parameter("pressed").value is False)
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
@@ -293,12 +301,12 @@ def test_pressed_parameter_takes_the_switch_from_a_page(world: World) -> None:
     with world.page() as page:
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
-        world.for_seconds(0.2)
+        world.until(lambda: world.switch.get_parameter("hand").value)  # the page has taken it
         world.set_pressed(True)
-        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "dead_mans_switch"})
         page.is_held = False
         world.for_seconds(0.5)
-        assert page.shown["switch"] == {"held": True, "by": "terminal"}
+        assert page.shown["switch"] == {"held": True, "by": "dead_mans_switch"}
         world.set_pressed(False)
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
 
@@ -307,7 +315,7 @@ def test_released_parameter_releases_a_page(world: World) -> None:
     with world.page() as page:
         page.press()
         world.until(lambda: len(world.heartbeats) > 5)
-        world.for_seconds(0.2)
+        world.until(lambda: world.switch.get_parameter("hand").value)  # the page has taken it
         world.set_pressed(False)
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
         world.assert_silence(0.4)  # in which the page goes on to beat
@@ -321,12 +329,13 @@ def terminal(world: World, make_node: Callable[..., Any]) -> Hand:
     return hand
 
 
-def test_hand_at_a_terminal_takes_the_switch_from_a_page(world: World, terminal: Hand) -> None:
+def test_hand_at_a_terminal_takes_the_switch_from_a_page(
+    world: World, terminal: Hand, heard: list[ParameterChange]
+) -> None:
     with world.page() as page:
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
-        world.until(lambda: world.takes)
-        world.for_seconds(ECHO)
+        world.until(lambda: heard)
         terminal.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
         assert terminal.holds
@@ -337,12 +346,13 @@ def test_hand_at_a_terminal_takes_the_switch_from_a_page(world: World, terminal:
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
 
 
-def test_page_takes_the_switch_from_a_hand_at_a_terminal(world: World, terminal: Hand) -> None:
+def test_page_takes_the_switch_from_a_hand_at_a_terminal(
+    world: World, terminal: Hand, heard: list[ParameterChange]
+) -> None:
     terminal.press()
+    world.until(lambda: heard)
     with world.page() as page:
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
-        world.until(lambda: world.takes)
-        world.for_seconds(ECHO)
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
         world.until(lambda: not terminal.holds)
@@ -351,12 +361,13 @@ def test_page_takes_the_switch_from_a_hand_at_a_terminal(world: World, terminal:
         world.assert_silence()
 
 
-def test_release_of_a_hand_at_a_terminal_releases_a_page(world: World, terminal: Hand) -> None:
+def test_release_of_a_hand_at_a_terminal_releases_a_page(
+    world: World, terminal: Hand, heard: list[ParameterChange]
+) -> None:
     with world.page() as page:
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
-        world.until(lambda: world.takes)
-        world.for_seconds(ECHO)
+        world.until(lambda: heard)
         terminal.release()
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
 
@@ -366,7 +377,7 @@ def test_switch_that_is_not_there_is_taken_when_it_comes_back(
 ) -> None:
     world.set_pressed(True)
     with world.page() as page:
-        world.until(lambda: page.shown["switch"]["by"] == "terminal")
+        world.until(lambda: page.shown["switch"]["by"] == "dead_mans_switch")
         world.switch.destroy_node()
         page.press()
         world.until(lambda: page.shown["switch"]["by"] == "this_page")
@@ -385,7 +396,8 @@ def test_engines_are_commanded(world: World) -> None:
 def test_line_tells_that_a_page_has_turned_the_engines_off(world: World) -> None:
     with world.page(type="engines", command="turn_off") as page:
         world.until(lambda: page.shown.get("lines"))
-    assert [line["text"] for line in page.shown["lines"]] == ["Turning off engines, as you asked..."]
+    (line,) = page.shown["lines"]
+    assert line["text"] == "Turning off engines, as operator_page asked..."
 
 
 def test_page_shows_the_limits_of_this_arm(
@@ -491,70 +503,63 @@ def test_topics_are_observed_only_while_a_page_is_open(
     def observed() -> set[str]:
         return {each.topic_name for each in world.program.subscriptions}
 
-    always = {"/operator_activity", "/engines", "/engines/state"}
+    always = {"/operator_activity", "/engines/sender"}
     world.until(lambda: observed() == always)
     with world.page():
         world.until(lambda: observed() > always | {"/effector/position", "/diagnostics", "/parameter_events"})
     world.until(lambda: observed() == always)
 
 
-def test_page_tells_why_the_engines_went_off_while_none_was_open(
+def test_page_that_opens_later_is_told_why_the_engines_are_off(
     world: World, make_node: Callable[..., Any]
 ) -> None:
-    def controller(name: str, engines: str) -> Any:
-        node = make_node(name)
-        publisher = node.create_publisher(String, "engines/state", topics.ENGINES_STATE.qos)
-        node.create_timer(0.1, lambda: publisher.publish(String(data=engines)))
-        return node
-
-    killed = controller("killed", topics.ON)
-    world.for_seconds(1.0)
-    killed.destroy_node()
-    controller("successor", topics.OFF)
+    world.service(make_node, "engine_controller", engine_controller.wire)
     world.for_seconds(1.0)
 
     with world.page() as page:
-        assert page.shown["engines"]["why"] == RESTARTED
+        why = "not turned on since engine_controller started"
+        world.until(lambda: page.shown["engines"]["why"] == why)
 
 
-class Controller:
-    """An engine controller that obeys, and repeats its state."""
-
-    def __init__(self, make_node: Callable[..., Any]) -> None:
-        self._state = topics.ON
-        node = make_node("controller")
-        publisher = node.create_publisher(String, "engines/state", topics.ENGINES_STATE.qos)
-        node.create_timer(0.1, lambda: publisher.publish(String(data=self._state)))
-        node.create_subscription(String, "engines", self._obey, topics.ENGINES.qos)
-
-    def _obey(self, _: String) -> None:
-        self._state = topics.OFF
+def present_operator(make_node: Callable[..., Any]) -> None:
+    node = make_node("operator")
+    publisher = node.create_publisher(Header, "operator_presence", topics.OPERATOR_PRESENCE.qos)
+    node.create_timer(0.1, lambda: publisher.publish(Header(stamp=stamps.to_message(stamps.now()))))
 
 
-def test_page_names_the_service_that_turned_the_engines_off(
-    world: World, make_node: Callable[..., Any]
-) -> None:
+def test_page_names_the_node_that_commands_the_engines(world: World, make_node: Callable[..., Any]) -> None:
     commands: Subject[str] = Subject()
-    guard = world.service(make_node, "torque_guard", lambda node: node.publish(topics.ENGINES, commands))
-    Controller(make_node)
+    world.service(make_node, "torque_guard", lambda node: node.publish(topics.ENGINES, commands))
+    world.service(make_node, "engine_controller", engine_controller.wire)
+    tool = make_node("rqt").create_publisher(String, "engines", topics.ENGINES.qos)
     with world.page() as page:
-        world.until(lambda: page.shown["engines"]["state"] == topics.ON)
+        refused = "no operator seen yet"
+        world.until(lambda: page.shown["engines"]["state"] == topics.OFF)
+        commands.on_next(topics.TURN_ON)
+        world.until(lambda: page.shown["engines"]["refused"] == refused)
+        present_operator(make_node)
         world.for_seconds(0.5)
+        commands.on_next(topics.TURN_ON)
+        world.until(lambda: page.shown["engines"]["why"] == "turned on by torque_guard")
         commands.on_next(topics.TURN_OFF)
-        guard.health.report()
         world.until(lambda: page.shown["engines"]["why"] == "turned off by torque_guard")
-
-
-def test_page_names_the_node_without_health_that_may_have_turned_the_engines_off(
-    world: World, make_node: Callable[..., Any]
-) -> None:
-    publisher = make_node("rqt").create_publisher(String, "engines", topics.ENGINES.qos)
-    Controller(make_node)
-    with world.page() as page:
+        commands.on_next(topics.TURN_ON)
         world.until(lambda: page.shown["engines"]["state"] == topics.ON)
-        world.for_seconds(0.5)
-        publisher.publish(String(data=topics.TURN_OFF))
-        world.until(lambda: page.shown["engines"]["why"] == "turned off by rqt")
+        tool.publish(String(data=topics.TURN_OFF))
+        world.until(lambda: page.shown["engines"]["why"] == "turned off by a node that gave no name")
+
+
+def test_page_ends_and_all_others_hear_of_the_end_of_the_context(
+    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path, context: Context
+) -> None:
+    World(make_node, spin_until, tmp_path)
+    ended: list[str] = []
+    for name in ("first", "second"):
+        context.on_shutdown(partial(ended.append, name))
+
+    context.try_shutdown()
+
+    assert ended == ["first", "second"]
 
 
 def test_taken_port_disables_the_page_and_nothing_else(

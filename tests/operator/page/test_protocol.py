@@ -13,6 +13,7 @@ from deploy.operator.page.protocol import (
     PROGRAMS,
     Beat,
     Engines,
+    Fault,
     FollowScenario,
     Hello,
     Message,
@@ -35,6 +36,7 @@ GOOD: list[tuple[str, Message]] = [
     ('{"type": "set", "name": "l1", "value": 2}', Set("l1", 2.0)),
     ('{"type": "set", "name": "theta2", "value": -1.5}', Set("theta2", -1.5)),
     ('{"type": "follow_scenario"}', FollowScenario()),
+    ('{"type": "fault", "text": "a is not defined"}', Fault("a is not defined")),
     ('{"type": "process", "name": "kinematics", "action": "kill"}', Process("kinematics", "kill")),
     ('{"type": "process", "name": "sentinel", "action": "stop"}', Process("sentinel", "stop")),
 ]
@@ -52,6 +54,8 @@ BAD = [
     '{"type": "beat"}',
     '{"type": "beat", "nonce": 1}',
     '{"type": "beat", "nonce": null}',
+    '{"type": "fault", "text": 1}',
+    '{"type": "fault"}',
     '{"type": "beat", "nonce": "1", "more": 1}',
     '{"type": "beat", "nonce": "1", "nonce": "2"}',
     '{"type": "beat", "nonce": "1"} ?',
@@ -110,6 +114,8 @@ def _is_within_the_protocol(message: Message) -> bool:
             return command in ("turn_on", "turn_off")
         case Set(name, value):
             return math.isfinite(value) and LIMITS[name][0] <= value <= LIMITS[name][1]
+        case Fault(text):
+            return isinstance(text, str)
         case Process(name, action):
             return name in PROGRAMS and action in ("kill", "stop")
     return message in (Release(), FollowScenario())

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import reactivex as rx
 
-from deploy.operator.page import requests
+from deploy.operator.page import protocol, requests
 from deploy.operator.page.protocol import Process
 from deploy.operator.page.server import Request
 from deploy.operator.page.state import Change, PageState, Program
@@ -37,6 +38,14 @@ def refusals(request: Request, programs: dict[tuple[str, str], Program]) -> list
     changes: list[Change] = []
     requests.send_signal(request, programs).subscribe(changes.append)
     return list(reduce(lambda state, change: change(state), changes, PageState()).refusals.items)
+
+
+def test_each_error_of_pages_is_told_once() -> None:
+    texts = ["a", "b", "a", *map(str, range(100))]
+    asked = rx.of(*(Request("page", protocol.Fault(text), True) for text in texts))
+    reported: list[str] = []
+    requests.faults(asked).subscribe(reported.append)
+    assert reported == ["a", "b", *map(str, range(requests.MOST_FAULTS - 2))]
 
 
 def test_page_on_the_machine_may_kill_a_process(sent: list[Any], tmp_path: Path) -> None:

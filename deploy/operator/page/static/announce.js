@@ -1,4 +1,4 @@
-/** Tells a screen reader what matters, each change once. */
+/** Announces to a screen reader what matters, each change once. */
 
 import { byId } from "./dom.js";
 

@@ -7,36 +7,68 @@ import { niceStep } from "./scale.js";
 const EDGE = 108; // of the drawing, in its units, from the base
 const EXTENT = 330; // of the grid: a wide window shows more than the square
 const PATH_TIME = 8; // s
+const CALM = 0.2; // s between two numbers that are read, or two whole paths: texts and long paths cost most
 const PATH_PARTS = 5; // of falling opacity
+const JOINTS = ["l1", "l2", "theta1", "theta2"];
 const SUMMARY_PERIOD = 1; // s
 const LEAST_ARC = 0.05; // rad; a shorter arc cannot be seen, and has no label
 const LABEL = { width: 48, height: 14 }; // of an angle
+const STOPPING = 0.5; // s after "off" in which news of a movement may still come
+const MOVED = 1; // s for which the drawing reports a movement without engines
+const POWERS = {
+  on: "Engines on",
+  off: "Engines off: stands still",
+  moved: "Moved with the engines off",
+  unknown: "Engines unknown",
+};
 const TOLERANCE = 0.03; // of the reach, between the reported position and the joints'
 
 export class Arm {
   constructor() {
     this._svg = byId("arm");
     this._view = 0; // radius that is shown [m]
-    this._drawn = {};
     this._summarized = -Infinity;
+    this.forget();
     this._build();
   }
 
+  /** Forget what was drawn: what comes next is of another time. */
+  forget() {
+    this._drawn = {};
+    this._moved = -Infinity;
+    this._told = -Infinity;
+  }
+
   /** Draw the newest state. */
-  render(model) {
-    const { arm, position, trace, time } = model;
-    if (arm !== this._drawn.arm || position !== this._drawn.position) {
-      this._drawn = { arm, position };
+  render(model, isLive) {
+    const { arm, position, trace, time, unheard, engines, speed } = model;
+    const drawn = this._drawn;
+    const isOff = engines.state === "off" && !(time - engines.since < STOPPING);
+    const hasMoved = JOINTS.some((name) => (drawn.arm?.[name] ?? arm[name]) !== arm[name]);
+    if (isOff && hasMoved) this._moved = time;
+    const isKnownAsBefore = unheard === drawn.unheard && isLive === drawn.isLive;
+    this._tells = !isKnownAsBefore || Math.abs(time - this._told) >= CALM;
+    if (this._tells) this._told = time;
+    if (this._tells || arm !== drawn.arm || position !== drawn.position) {
+      this._drawn = { arm, position, unheard, isLive };
+      const isHeard = (name) => isLive && !unheard.includes(name);
       const isKnown = Object.values(arm).every((value) => value !== null);
       this._moving.setAttribute("visibility", isKnown ? "visible" : "hidden");
-      if (isKnown) this._place(arm, position);
+      if (isKnown) this._place(arm, position, isHeard);
       this._digits = isKnown ? digitsOf(arm.l1 + arm.l2) : 2;
-      setText(byId("x"), number(position?.x, this._digits));
-      setText(byId("y"), number(position?.y, this._digits));
-      this._summarize(arm, position, isKnown, time);
+      const shown = isHeard("position") ? position : null;
+      if (this._tells) {
+        setText(byId("x"), number(shown?.x, this._digits));
+        setText(byId("y"), number(shown?.y, this._digits));
+        setText(byId("speed"), number(isLive ? speed : null));
+        this._summarize(arm, shown, isKnown && JOINTS.every(isHeard), time);
+      }
     }
-    this._drawPath(trace, time);
-    setText(byId("speed"), number(model.speed));
+    if (this._tells) this._drawPath(trace, time);
+    this._drawHead(trace);
+    const power = isLive ? (engines.state ?? "unknown") : "unknown";
+    setAttributes(this._svg, { "data-power": power === "off" && time - this._moved < MOVED ? "moved" : power });
+    setText(this._power, POWERS[this._svg.dataset.power]);
   }
 
   _build() {
@@ -47,9 +79,11 @@ export class Arm {
     this._ticks = draw(svg, "g", { class: "ticks" });
     this._reach = draw(svg, "circle", { class: "reach" });
     this._reachLabel = draw(svg, "text", { class: "reach-label", "text-anchor": "middle" });
+    this._power = draw(svg, "text", { class: "power", x: -116, y: 104 });
     this._paths = Array.from({ length: PATH_PARTS }, (_, part) =>
       draw(svg, "path", { class: "trail", "stroke-opacity": ((part + 1) / PATH_PARTS).toFixed(2) }),
     );
+    this._head = draw(svg, "path", { class: "trail" });
     this._moving = draw(svg, "g", { visibility: "hidden" });
     const moving = this._moving;
     this._extension = draw(moving, "line", { class: "extension" });
@@ -70,10 +104,12 @@ export class Arm {
     draw(this._effector, "circle", { class: "dot", r: 3.5 });
     this._lagLabel = draw(this._effector, "text", { class: "lag", y: 2.5 });
     setText(this._lagLabel, "last position");
-    for (const angle of this._angles) angle.label = draw(moving, "text", { class: "angle-label" });
+    for (const angle of this._angles) {
+      angle.label = draw(moving, "text", { class: "angle-label", "text-anchor": "middle" });
+    }
   }
 
-  _place(arm, position) {
+  _place(arm, position, isHeard) {
     const reach = arm.l1 + arm.l2;
     this._fit(reach);
     const scale = EDGE / this._view;
@@ -96,14 +132,21 @@ export class Arm {
     arc(this._angles[0].arc, [0, 0], 0, one, 20);
     arc(this._angles[1].arc, elbow, one, arm.theta2, 16);
     const [placeOne, placeTwo] = labelPlaces(one, arm.theta2, elbow);
-    label(this._angles[0].label, placeOne, arm.theta1, "θ₁");
-    label(this._angles[1].label, placeTwo, arm.theta2, "θ₂");
+    this._label(0, placeOne, isHeard("theta1") ? arm.theta1 : NaN, "θ₁");
+    this._label(1, placeTwo, isHeard("theta2") ? arm.theta2 : NaN, "θ₂");
+    setAttributes(this._moving, { "data-heard": JOINTS.every(isHeard) ? "yes" : "no" });
 
     const isCurrent = !position || Math.hypot(seen[0] - tip[0], seen[1] - tip[1]) <= TOLERANCE * reach * scale;
     setAttributes(this._svg, { "data-current": isCurrent ? "yes" : "no" });
     setAttributes(this._effector, { transform: `translate(${seen[0].toFixed(2)} ${seen[1].toFixed(2)})` });
     setAttributes(this._lagLabel, { x: seen[0] > 0 ? -11 : 11, "text-anchor": seen[0] > 0 ? "end" : "start" });
     ends(this._lag, tip, seen);
+  }
+
+  _label(index, [x, y], angle, name) {
+    const { label } = this._angles[index];
+    setAttributes(label, { transform: `translate(${x.toFixed(1)} ${(y + 2.8).toFixed(1)})` }); // lays out no text
+    if (this._tells) setText(label, Math.abs(wrap(angle)) < LEAST_ARC ? "" : `${name} ${degrees(angle)}`);
   }
 
   /** Choose the radius that is shown; it changes seldom, so that links visibly grow and shrink. */
@@ -142,24 +185,38 @@ export class Arm {
       const y = -trace.at(row, 2) * scale;
       if (!Number.isFinite(x + y)) continue;
       const point = `${x.toFixed(1)} ${y.toFixed(1)}`;
+      if (point === last) continue; // the arm stands
       if (part === lastPart) parts[part] += `L${point}`;
       else parts[part] += last ? `M${last}L${point}` : `M${point}`;
       lastPart = part;
       last = point;
     }
     parts.forEach((d, part) => setAttributes(this._paths[part], { d }));
+    this._end = last ? trace.at(trace.length - 1, 0) : Infinity;
   }
 
-  /** Tell a screen reader, on its demand, what the drawing shows. */
+  /** Draw the path since its whole was drawn. */
+  _drawHead(trace) {
+    const scale = EDGE / this._view;
+    let d = "";
+    for (let row = trace.from(this._end); row < trace.length; row += 1) {
+      const point = `${(trace.at(row, 1) * scale).toFixed(1)} ${(-trace.at(row, 2) * scale).toFixed(1)}`;
+      if (!point.includes("NaN")) d += `${d ? "L" : "M"}${point}`;
+    }
+    setAttributes(this._head, { d });
+  }
+
+  /** Describe to a screen reader, on its demand, what the drawing shows. */
   _summarize(arm, position, isKnown, time) {
-    if (Math.abs(time - this._summarized) < SUMMARY_PERIOD) return;
+    if (Math.abs(time - this._summarized) < SUMMARY_PERIOD && isKnown === this._wasKnown) return;
     this._summarized = time;
+    this._wasKnown = isKnown;
     const angles = `${degrees(arm.theta1)} and ${degrees(arm.theta2)}`;
     const links = `Links of ${number(arm.l1, digitsOf(arm.l1))} and ${number(arm.l2, digitsOf(arm.l2))} metres, joints at ${angles}.`;
     const effector = position ? ` Effector at x ${number(position.x, this._digits)}, y ${number(position.y, this._digits)} metres.` : "";
     const isOld = this._svg.dataset.current === "no";
     const lag = isOld ? " This position is old: it does not follow the joints." : "";
-    setText(byId("arm-summary"), isKnown ? links + effector + lag : "The configuration is not known yet.");
+    setText(byId("arm-summary"), isKnown ? links + effector + lag : "The configuration is not known.");
   }
 }
 
@@ -196,11 +253,6 @@ function arc(element, [cx, cy], from, by, radius) {
   const at = (direction) =>
     `${(cx + radius * Math.cos(direction)).toFixed(2)} ${(cy - radius * Math.sin(direction)).toFixed(2)}`;
   setAttributes(element, { d: `M${at(from)}A${radius} ${radius} 0 0 ${turn > 0 ? 0 : 1} ${at(from + turn)}` });
-}
-
-function label(element, [x, y], angle, name) {
-  setAttributes(element, { x: x.toFixed(1), y: (y + 2.8).toFixed(1), "text-anchor": "middle" });
-  setText(element, Math.abs(wrap(angle)) < LEAST_ARC ? "" : `${name} ${degrees(angle)}`);
 }
 
 /** An angle [rad] between −π and π. */

@@ -57,7 +57,7 @@ export function confirmByHolding(button, act, hint) {
       act();
     } else {
       armedUntil = performance.now() + ARMED;
-      announce(`Activate again to confirm: ${button.ariaLabel}.`);
+      announce(`Activate again to confirm: ${button.ariaLabel ?? button.textContent}.`);
     }
   });
 }

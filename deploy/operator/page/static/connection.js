@@ -10,6 +10,8 @@ const FINAL = {
   4401: "This page has no token of the present start. Open the address that the terminal shows now.",
   4403: "The server does not accept this address. Open the address that the terminal shows.",
 };
+/** Too much of something at a time, such as pages: another attempt may succeed. */
+const FULL = 4429;
 const NO_TOKEN = "This address has no token. Open the address that the terminal shows.";
 
 export class Connection {
@@ -23,6 +25,8 @@ export class Connection {
     this._token = "";
     /** Attempts that failed since the last update. */
     this.failures = 0;
+    /** Why the server did not admit this page at the last attempt. */
+    this.refused = "";
     this._retry = 0;
     this._opened = 0;
     this._heard = -Infinity;
@@ -82,13 +86,19 @@ export class Connection {
   }
 
   _connect() {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const socket = new WebSocket(`${scheme}://${location.host}/socket`);
+    const address = new URL("socket", location.href); // relative: the page may lie under a path of a proxy
+    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    address.hash = "";
+    const socket = new WebSocket(address);
     this._socket = socket;
     this._opened = performance.now();
     socket.onopen = () => socket === this._socket && this.send({ type: "hello", token: this._token });
     socket.onmessage = (event) => socket === this._socket && this._receive(JSON.parse(event.data));
-    socket.onclose = (event) => socket === this._socket && this._lose(FINAL[event.code]);
+    socket.onclose = (event) => {
+      if (socket !== this._socket) return;
+      this.refused = event.code === FULL ? event.reason : "";
+      this._lose(FINAL[event.code]);
+    };
   }
 
   _receive(message) {
@@ -96,6 +106,7 @@ export class Connection {
       this._heard = performance.now();
       this.since = new Date();
       this.failures = 0;
+      this.refused = "";
       if (this.state !== "live") this._become("live");
     }
     this._listener[message.type]?.(message);

@@ -13,11 +13,11 @@ export function number(value, digits = 2) {
 export const digitsOf = (length) => (length > 0 ? Math.max(2, 2 - Math.ceil(Math.log10(length))) : 2);
 
 /** An angle [rad] in degrees. */
-export const degrees = (angle) => `${number((angle * 180) / Math.PI, 1)}°`;
+export const degrees = (angle) => (Number.isFinite(angle) ? `${number((angle * 180) / Math.PI, 1)}°` : UNKNOWN);
 
 /** A duration [s] in words that are read at a glance. */
 export function duration(seconds) {
-  if (seconds === null || seconds === undefined) return UNKNOWN;
+  if (!Number.isFinite(seconds)) return UNKNOWN;
   if (seconds < 10) return `${number(Math.max(0, seconds), 1)} s`;
   if (seconds < 60) return `${Math.floor(seconds)} s`;
   const minutes = Math.floor(seconds / 60);

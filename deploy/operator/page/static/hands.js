@@ -3,7 +3,8 @@
 const TRIGGERS = [6, 7]; // of the standard gamepad
 const PRESSED = 0.6; // of a trigger's way; below RELEASED it is let go
 const RELEASED = 0.4;
-/** Keys after which some systems do not tell that another key is let go. */
+const SLIP = 8; // px beside the button that still hold
+/** Keys after which some systems do not report that another key is let go. */
 const THIEVES = new Set(["Meta", "Alt", "F10"]);
 
 // How long a hand counts without another sign of life [ms], where its release may be lost: on X11, a hotkey or a
@@ -19,16 +20,17 @@ const STILL = 5000; // of a gamepad, which keeps its last state when its radio l
  * @param {HTMLElement} button
  * @param {(event: object) => void} feed takes the events of hold.js
  * @param {() => boolean} isHeld
+ * @param {() => void} turnOn called when a key is pressed while another hand holds
  * @returns {() => void} polls the gamepads, which have no events for their triggers
  */
-export function listen(button, feed, isHeld) {
-  listenToPointers(button, feed);
-  listenToKeys(button, feed);
+export function listen(button, feed, isHeld, turnOn) {
+  listenToPointers(button, feed, isHeld);
+  listenToKeys(button, feed, isHeld, turnOn);
   listenToPage(button, feed, isHeld);
   return gamepads(feed);
 }
 
-function listenToPointers(button, feed) {
+function listenToPointers(button, feed, isHeld) {
   const hand = (event) => `pointer ${event.pointerId}`;
   const up = (event) => feed({ type: "up", hand: hand(event) });
 
@@ -37,15 +39,29 @@ function listenToPointers(button, feed) {
     button.setPointerCapture(event.pointerId);
     feed({ type: "down", hand: hand(event) });
   });
-  for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(type, up);
+  for (const type of ["pointerup", "lostpointercapture"]) button.addEventListener(type, up);
+  button.addEventListener("pointercancel", (event) =>
+    feed({ type: "up", hand: hand(event), why: "the browser took the pointer for a gesture of its own" }),
+  );
+  // A press on a selection, as after Ctrl+A, must not become a drag of it.
+  button.addEventListener("dragstart", (event) => event.preventDefault());
   button.addEventListener("pointermove", (event) => {
     if (!(event.buttons & 1)) up(event); // its pointerup was lost: a mouse moves, or a pen hovers
+    else if (isBeside(button, event)) feed({ type: "up", hand: hand(event), why: "the hand slid off the button" });
+  });
+  button.addEventListener("pointerenter", (event) => {
+    if (event.buttons & 1 && !isHeld()) feed({ type: "hint", why: "A drag holds nothing: press on the button itself" });
   });
   // Keeps a long touch from becoming a gesture: selection, context menu, scrolling.
   button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
 }
 
-function listenToKeys(button, feed) {
+function isBeside(button, { clientX, clientY }) {
+  const { left, right, top, bottom } = button.getBoundingClientRect();
+  return clientX < left - SLIP || clientX > right + SLIP || clientY < top - SLIP || clientY > bottom + SLIP;
+}
+
+function listenToKeys(button, feed, isHeld, turnOn) {
   const down = new Map(); // keys that pressed, as long as they are down, with the time of their last event
   const hand = (event) => `key ${event.code}`;
   const lack = "the key does not repeat any more";
@@ -54,6 +70,10 @@ function listenToKeys(button, feed) {
     if (event.key !== " " && event.key !== "Enter") return;
     event.preventDefault();
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+    if (isHeld() && !down.has(event.code)) {
+      turnOn();
+      return;
+    }
     down.set(event.code, event.timeStamp);
     feed({ type: "down", hand: hand(event), lasts: FIRST_REPEAT, lack });
   });
@@ -125,7 +145,11 @@ function gamepads(feed) {
   const lasting = { lasts: STILL, lack: `the gamepad has not moved for ${STILL / 1000} s` };
 
   // A trigger that is found pressed has to be let go first.
-  window.addEventListener("gamepadconnected", ({ gamepad }) => pads.set(gamepad.index, { isDown: true, shown: "" }));
+  window.addEventListener("gamepadconnected", ({ gamepad }) => {
+    pads.set(gamepad.index, { isDown: true, shown: "" });
+    if (gamepad.mapping === "standard") return;
+    feed({ type: "hint", why: "The browser does not know the buttons of this gamepad: use mouse, finger or key" });
+  });
   window.addEventListener("gamepaddisconnected", ({ gamepad }) => {
     pads.delete(gamepad.index);
     feed({ type: "up", hand: hand(gamepad.index), why: "the gamepad was disconnected" });

@@ -12,6 +12,7 @@
  * - `lost`: `why`, such as a window that lost focus;
  * - `tick`: `wall`, the time of the wall clock; every PERIOD;
  * - `refused`, `released`: `why`, by the server;
+ * - `hint`: `why` something that looks like a hold is none;
  * - `disconnected`.
  */
 
@@ -75,6 +76,8 @@ export function step(state, event) {
       return { state: { ...state, held: false, hand: null, why: `Not held: ${event.why}` }, send: [] };
     case "released":
       return { state: state.held ? release(state, event.why).state : state, send: [] };
+    case "hint":
+      return { state: state.held ? state : { ...state, why: event.why }, send: [] };
     case "disconnected":
       return disconnect(state);
     default:
@@ -120,7 +123,7 @@ function lively(state, { at, lasts = Infinity, lack = "" }) {
   return { ...state, until: at + lasts, lack };
 }
 
-/** The state with what an event tells about nonces and clocks. */
+/** The state with what an event says about nonces and clocks. */
 function noted(state, event) {
   if (event.type === "update") return { ...state, nonce: event.nonce, heard: event.at };
   if (event.type === "tick") return { ...state, ticked: event.at, offset: event.wall - event.at };

@@ -6,29 +6,61 @@ import { sentence } from "./format.js";
 
 const SHORT = 400; // ms; a shorter press is taken for a click
 
-/** Title and hint of the button by its state; `stop`: time until the engines are off [s]. */
-const WORDS = {
-  offline: () => ["Not connected", "Released. Holding needs a connection."],
-  released: () => ["Hold to run", "Released. Press and hold here."],
-  pressing: () => ["Pressed", "Waiting for the switch …"],
-  held: (stop) => ["Held by you", `Let go, and the engines stop within ${stop} s.`],
-  releasing: () => ["Let go", "Waiting for the switch …"],
-  other_page: () => ["Held on another page", "Only one page can hold at a time."],
-  terminal: () => ["Hold to run", "The terminal holds. Hold here to take over."],
-  scenario: () => ["Hold to run", "The scenario holds. Hold here to take over."],
+const OTHERS = {
+  other_page: "Another page holds. Only one can.",
+  terminal: "The terminal holds. Hold here to take over.",
+  dead_mans_switch: "The scenario holds. Hold here to take over.",
 };
+
+/**
+ * Title and hint of the button: what the engines do, and what happens without the hand.
+ *
+ * @param {string} state of {@link holdState}
+ * @param {{state: string|null, stops_in: number|null}} engines
+ * @param {number} bound time after which they are off, whatever dies [s]
+ */
+export function words(state, engines, bound) {
+  const isOn = engines.state === "on";
+  const left = engines.stops_in === null ? "soon" : `in ${Math.ceil(engines.stops_in)} s`;
+  switch (state) {
+    case "offline":
+      return ["Not connected", "Released. Holding needs a connection."];
+    case "pressing":
+      return ["Pressed", "Waiting for the switch …"];
+    case "releasing":
+      return ["Let go", "Waiting for the switch …"];
+    case "held":
+      if (isOn) return ["ENGINES ON", `Let go: off ${left}, or ${bound}\u00a0s if programs crash.`];
+      return engines.state === "off"
+        ? ["Held, now turn on", "Press Enter, or use a second finger."]
+        : ["Held", "No word from the engine controller."];
+    case "released":
+      if (!isOn) return ["Hold", `Engines ${engines.state ?? "unknown"}. Press and hold here.`];
+      return engines.stops_in === 0
+        ? ["Stops now", "Released. Hold and turn on again."]
+        : [`Stops ${left}, hold to keep`, "Released, engines on."];
+    default:
+      return [isOn ? "ENGINES ON" : state === "other_page" ? "Held on another page" : "Hold", OTHERS[state] ?? `Held by ${state}. Hold here to take over.`];
+  }
+}
+
+/** How much of the fuse is left, from 0 to 1. */
+export function fuse({ engines, welcome }) {
+  if (engines.state !== "on" || engines.stops_in === null) return 0;
+  return Math.min(1, engines.stops_in / Math.min(welcome.strikes * welcome.silence, welcome.presence_timeout));
+}
 
 /**
  * What the button shows.
  *
- * @returns {keyof WORDS}
+ * @returns {string} the state of the button
  */
 export function holdState(isLive, hold, shown) {
   if (!isLive) return "offline";
   const isOurs = shown.held && shown.by === "this_page";
   if (hold.held) return isOurs ? "held" : "pressing";
   if (isOurs) return "releasing";
-  return shown.held ? (shown.by ?? "terminal") : "released";
+  return shown.held ? (shown.by ?? "somebody") : "released";
 }
 
 export class HoldButton {
@@ -41,14 +73,17 @@ export class HoldButton {
 
   render(model, hold, isLive) {
     const state = holdState(isLive, hold, model.switch);
-    const [title, hint] = WORDS[state](model.welcome?.off_within);
+    const [title, hint] = words(state, model.engines, model.welcome?.off_within);
+    this._title = title;
     setAttributes(this._button, {
       "data-state": state,
+      "data-engines": isLive ? (model.engines.state ?? "unknown") : "unknown",
       "aria-pressed": hold.held,
       "aria-disabled": isLive ? null : true,
     });
     setText(byId("hold-title"), title);
     setText(byId("hold-hint"), hint);
+    setAttributes(byId("fuse"), { "stroke-dasharray": `${isLive ? Math.round(100 * fuse(model)) : 0} 100` });
     this._why = hold.why;
     this._changed(state);
     setText(byId("hold-why"), sentence(hold.why) || this._hint);
@@ -62,7 +97,7 @@ export class HoldButton {
       this._pressedAt = now;
       this._hint = "";
     }
-    if (state === "held" || state === "other_page") announce(`${WORDS[state](0)[0]}.`);
+    if (state === "held" || state === "other_page") announce(`${this._title}.`);
     if (isOurs || !wasOurs) return;
     if (this._why) {
       alert(sentence(this._why));
@@ -70,7 +105,7 @@ export class HoldButton {
     } else {
       const isShort = now - this._pressedAt < SHORT;
       this._hint = isShort ? "Keep holding: the engines run only while you hold." : "";
-      announce(isShort ? this._hint : "Released.");
+      announce(isShort ? this._hint : state === "released" ? `Released. ${this._title}.` : "Released.");
     }
   }
 }

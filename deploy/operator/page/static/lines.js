@@ -8,7 +8,7 @@ const MOST = 200; // of each group: positions come fast, and must not push out w
 const GROUPS = {
   steady: ["data", "position", "speed", "signal", "alive"],
   operator: ["missed", "asleep", "hand"],
-  engines: ["engines", "own_turn_off", "others_turn_off", "state", "sender"],
+  engines: ["engines", "turn_off", "state"],
   processes: ["service", "process"],
 };
 const GROUP_OF = Object.fromEntries(

@@ -8,16 +8,21 @@ const MOST_LINES = 400;
 /** Without a change for this time [s], a plot shows a gap. */
 export const GAP = 1.5;
 
-const KEYS = ["time", "arm", "position", "speed", "operator", "switch", "engines", "sources", "processes"];
+const KEYS = ["time", "arm", "position", "speed", "unheard", "operator", "switch", "engines", "sources", "processes"];
 
-const INITIAL = {
+/** What is known without a word from the server. */
+export const INITIAL = {
+  /** The word for the time of all that. */
+  present: "now",
   time: NaN,
   arm: { l1: null, l2: null, theta1: null, theta2: null },
   position: null,
   speed: null,
+  /** The values of the arm, and `position`, that are known no more. */
+  unheard: [],
   operator: { seen: null, age: null, activity: null, strikes_left: null },
   switch: { held: false, by: null },
-  engines: { state: null, why: "", refused: null },
+  engines: { state: null, why: "", refused: null, stops_in: null },
   sources: {},
   processes: [],
 };
@@ -26,8 +31,8 @@ export class Model {
   constructor() {
     /** What the server said about itself at the begin of the connection. */
     this.welcome = null;
-    /** Samples [time, x, y, speed]. */
-    this.trace = new Rows(SAMPLES, 4);
+    /** Samples [time, x, y, speed, theta1, theta2]. */
+    this.trace = new Rows(SAMPLES, 6);
     this.hands = new Changes(SPAN);
     this.operators = new Changes(SPAN);
     /** How many strikes fell. */
@@ -44,11 +49,15 @@ export class Model {
     this.welcome = welcome;
     this.lines = [];
     Object.assign(this, INITIAL, { time: this.time });
-    if (this.hands.items.length) return; // this page knows more: which hand was its own
-    for (const [time, moment] of welcome.history ?? []) {
+    // Until then, this page knows more: which hand was its own. The server has seen the rest.
+    const known = this.hands.items.length ? this.time : -Infinity;
+    const history = welcome.history ?? [];
+    if (Number.isFinite(known) && history[0]?.[0] > known + GAP) this._gap(known);
+    for (const [time, moment] of history.filter((it) => it[0] > known)) {
       if (moment) this._note(time, moment);
       else this._gap(time);
     }
+    this._isFilled = history.length > 0;
   }
 
   /** Take over what changed. */
@@ -56,7 +65,8 @@ export class Model {
     if (message.time < this.time - 1) this._forget(); // another scenario
     const before = this.time;
     for (const key of KEYS) if (key in message) this[key] = message[key];
-    if (this.time - before > GAP) this._gap(before);
+    if (this.time - before > GAP && !this._isFilled) this._gap(before);
+    this._isFilled = false;
     for (const sample of message.trace ?? []) this._trace(sample);
     if (message.lines) this.lines = this.lines.concat(message.lines).slice(-MOST_LINES);
     this._note(this.time, this);

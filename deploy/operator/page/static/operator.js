@@ -26,15 +26,15 @@ export class Operator {
     });
   }
 
-  render({ operator, welcome }) {
+  render({ operator, welcome, switch: hold }) {
     if (welcome && welcome !== this._welcome) this._begin(welcome);
     const state = operatorState(operator);
-    const [sign, text] = OPERATORS[state] ?? ["idle", "Not known yet"];
+    const [sign, text] = OPERATORS[state] ?? ["idle", "Operator: unknown"];
     setAttributes(byId("operator"), { "data-state": state ?? "unknown" });
     for (const id of ["operator-sign", "mini-operator-sign"]) setAttributes(byId(id), { "data-sign": sign });
     const age = operator.age !== null && !operator.seen ? `, last seen ${duration(operator.age)} ago` : "";
     setText(byId("operator-text"), text + age);
-    setText(byId("mini-operator"), text);
+    setText(byId("mini-operator"), state === "seen" && hold.by === "this_page" ? "You hold" : text);
     this._drawSilence(operator.age);
     this._drawStrikes(operator.strikes_left);
     this._changed(state);
@@ -74,7 +74,7 @@ export class Operator {
       }
     }
     [...pips.children].forEach((pip, index) => {
-      setAttributes(pip, { "data-used": index >= (left ?? all) ? "yes" : "no" });
+      setAttributes(pip, { "data-used": left === null ? "unknown" : index >= left ? "yes" : "no" });
     });
   }
 }

@@ -5,7 +5,7 @@ import { confirmByHolding } from "./confirm.js";
 import { byId, create, setAttributes, setNote, setText } from "./dom.js";
 import { duration, sentence } from "./format.js";
 
-const REMEMBERED = 20; // s for which a row tells that its process came back
+const REMEMBERED = 20; // s for which a row shows that its process came back
 const UNSEEN = { process: null, goodPid: null, isDown: false, backAt: null };
 const ACTIONS = {
   kill: "Kill",
@@ -33,8 +33,9 @@ export class Processes {
     }
     if (isLive !== this._isLive) {
       this._isLive = isLive;
-      for (const { buttons } of this._rows.values()) {
-        for (const button of buttons) setAttributes(button, { "aria-disabled": isLive ? null : true });
+      for (const entry of this._rows.values()) {
+        if (!isLive) this._forget(entry);
+        for (const button of entry.buttons) setAttributes(button, { "aria-disabled": isLive ? null : true });
       }
     }
   }
@@ -99,12 +100,21 @@ export class Processes {
       setText(entry.state, !process.ok && process.state === "RUNNING" ? "unhealthy" : process.state.toLowerCase());
       setText(entry.host, process.host);
       setText(entry.restarts, String(process.restarts));
-      setText(entry.output, process.since_output === null ? "–" : `${duration(process.since_output)} ago`);
+    }
+    if (process !== entry.process || !process.ok) {
+      setText(entry.output, process.output === null ? "–" : `${duration(time - process.output)} ago`);
     }
     const isBack = entry.backAt !== null && time - entry.backAt < REMEMBERED;
     setAttributes(entry.row, { "data-back": isBack ? "yes" : null });
     setText(entry.health, isBack && process.ok ? "is back" : complaint(process));
     entry.process = process;
+  }
+
+  _forget(entry) {
+    entry.process = null;
+    setAttributes(entry.row, { "data-ok": null, "data-state": "unknown", "data-back": null });
+    setAttributes(entry.sign, { "data-sign": "idle" });
+    for (const [cell, text] of [[entry.state, "unknown"], [entry.output, "–"], [entry.health, ""]]) setText(cell, text);
   }
 
   _act(name, action) {

@@ -58,7 +58,7 @@ export class Changes {
 
   push(time, value) {
     if (this.items.at(-1)?.[1] !== value) this.items.push([time, value]);
-    // The change before the span tells the value at its begin.
+    // The change before the span gives the value at its begin.
     while (this.items.length > this._capacity || this.items[1]?.[0] < time - this._span) this.items.shift();
   }
 }

@@ -65,7 +65,7 @@ export function frameOf(sheet) {
   };
 }
 
-export function drawTimeAxis(context, sheet, { left, right, top, bottom }) {
+export function drawTimeAxis(context, sheet, { left, right, top, bottom }, present) {
   const { colours, unit } = sheet;
   context.textBaseline = "top";
   context.lineWidth = 1;
@@ -77,7 +77,7 @@ export function drawTimeAxis(context, sheet, { left, right, top, bottom }) {
     if (isNarrow && ago % 20) continue;
     context.textAlign = ago === 0 ? "right" : "center";
     context.fillStyle = colours.muted;
-    context.fillText(ago === 0 ? "now" : `−${ago} s`, x, bottom + unit * 0.45);
+    context.fillText(ago === 0 ? present : `−${ago} s`, x, bottom + unit * 0.45);
   }
 }
 

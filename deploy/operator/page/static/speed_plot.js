@@ -2,12 +2,13 @@
 
 import { byId, setText } from "./dom.js";
 import { number } from "./format.js";
-import { GAP, SPAN } from "./model.js";
+import { SPAN } from "./model.js";
 import { niceStep } from "./scale.js";
 import { Sheet, drawTimeAxis, frameOf, stroke } from "./sheet.js";
 
 const USUAL = 0.9; // of the samples of a moving arm lie within the usual speeds: spikes are rare
 const STILL = 0.01; // m/s; slower is no movement
+const UNHEARD = 0.3; // s without a sample: the speed of the time between is not known
 const HEADROOM = 1.5; // times the usual speed fits into the plot
 
 /** The speed [m/s] that a moving arm seldom exceeds. */
@@ -22,7 +23,7 @@ export class SpeedPlot {
     this._top = 1; // m/s at the upper edge
   }
 
-  render({ trace, time, speed }) {
+  render({ trace, time, speed, present }, isLive) {
     if (!Number.isFinite(time)) return;
     const begin = trace.from(time - SPAN);
     const speeds = new Float64Array(trace.length - begin);
@@ -32,13 +33,13 @@ export class SpeedPlot {
     const above = highest > this._top ? ", above this plot" : "";
     setText(
       byId("speed-summary"),
-      speeds.length ? `now ${number(speed)} m/s, highest ${number(highest)} m/s${above}` : "no data yet",
+      speeds.length ? `${present} ${number(isLive ? speed : null)} m/s, highest ${number(highest)} m/s${above}` : "no data yet",
     );
     const context = this._sheet.open();
     if (!context) return;
     const frame = frameOf(this._sheet);
     this._drawScale(context, frame);
-    drawTimeAxis(context, this._sheet, frame);
+    drawTimeAxis(context, this._sheet, frame, present);
     this._drawCurve(context, frame, trace, begin, time);
   }
 
@@ -76,7 +77,7 @@ export class SpeedPlot {
     for (let row = begin; row < trace.length; row += 1) {
       const at = trace.at(row, 0);
       const value = trace.at(row, 3);
-      if (Number.isNaN(value) || at - last > GAP) piece = null;
+      if (Number.isNaN(value) || at - last > UNHEARD) piece = null;
       last = at;
       if (Number.isNaN(value)) continue;
       if (!piece) pieces.push((piece = []));

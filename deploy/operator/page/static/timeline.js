@@ -1,4 +1,4 @@
-/** Hand, operator and engines over the last minute; shape and word tell as much as colour. */
+/** Hand, operator and engines over the last minute; shape and word show as much as colour. */
 
 import { byId, setText } from "./dom.js";
 import { SPAN } from "./model.js";
@@ -10,7 +10,7 @@ const LOOKS = {
   this_page: { kind: "solid", colour: "good", word: "you" },
   other_page: { kind: "solid", colour: "accent", word: "another page" },
   terminal: { kind: "solid", colour: "accent", word: "terminal" },
-  scenario: { kind: "solid", colour: "accent", word: "scenario" },
+  dead_mans_switch: { kind: "solid", colour: "accent", word: "scenario" },
   somewhere: { kind: "solid", colour: "accent", word: "held" },
   seen: { kind: "solid", colour: "good", word: "seen" },
   unseen: { kind: "hollow", colour: "muted", word: "not seen" },
@@ -25,18 +25,18 @@ export class Timeline {
     this._sheet = new Sheet("timeline-plot");
   }
 
-  render({ hands, operators, strikes, engineStates, time, switch: hold, operator, engines }) {
+  render({ hands, operators, strikes, engineStates, time, switch: hold, operator, engines, present }, isLive) {
     if (!Number.isFinite(time)) return;
     const words = [
       hold.held ? "Held" : "Released",
       operator.seen ? "operator seen" : "operator not seen",
       `engines ${engines.state ?? "not known"}`,
     ];
-    setText(byId("timeline-summary"), words.join(", "));
+    setText(byId("timeline-summary"), isLive ? words.join(", ") : "not known now");
     const context = this._sheet.open();
     if (!context) return;
     const frame = frameOf(this._sheet);
-    drawTimeAxis(context, this._sheet, frame);
+    drawTimeAxis(context, this._sheet, frame, present);
     const rows = [
       ["Hand", hands.items],
       ["Operator", operators.items],

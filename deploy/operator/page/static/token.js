@@ -1,4 +1,8 @@
-/** The token of this start: it comes in the fragment of the printed address and lives as long as the tab. */
+/**
+ * The token of this start: it comes in the fragment of the printed address and lives as long as the tab.
+ *
+ * Where the browser stores nothing, it stays in the address.
+ */
 
 const KEY = "reactive-arm token";
 
@@ -10,9 +14,15 @@ const KEY = "reactive-arm token";
 export function takeToken() {
   const token = location.hash.slice(1);
   // The skip link also sets the fragment: an id of the page is no token.
-  if (token && !document.getElementById(token)) {
-    sessionStorage.setItem(KEY, token);
-    history.replaceState(null, "", location.pathname + location.search);
+  const given = token && !document.getElementById(token) ? token : "";
+  try {
+    if (given) {
+      sessionStorage.setItem(KEY, given);
+      history.replaceState(null, "", location.pathname + location.search);
+    }
+    return sessionStorage.getItem(KEY) ?? "";
+  } catch (error) {
+    if (!(error instanceof DOMException)) throw error;
+    return given;
   }
-  return sessionStorage.getItem(KEY) ?? "";
 }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import re
-import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +11,9 @@ from typing import Any
 
 import pytest
 
-from tests.system.sites import ROOT, Site
+from deploy.supervision.processes import ROOT
+from tests.ports import free_port
+from tests.system.sites import Site
 
 from .chromium import HandOnPage
 from .record import Record
@@ -31,8 +32,7 @@ class Arm:
     ) -> None:
         """:param namespace: the network namespace of the system; empty for that of this process."""
         self.site = Site(run, domain)
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.port: int = free.getsockname()[1]
+        self.port = free_port()
         page = {"port": self.port} | page
         parameters = run.with_suffix(".yaml")
         lines = "".join(f"\n    {name}: {value}" for name, value in page.items())
@@ -53,8 +53,10 @@ class Arm:
 
 
 def hold_with_engines_on(arm: Arm, hand: HandOnPage, *hands: Callable[[], None]) -> None:
-    """Hold until heartbeats flow and the engines are on; ``hands`` as of :meth:`HandOnPage.hold`."""
-    begin = time.time()
+    """Hold until the engines are on and heartbeats flow then; ``hands`` as of :meth:`HandOnPage.hold`.
+
+    A machine that stands still may end a hold at any time: it begins again.
+    """
 
     def is_held() -> bool:
         return hand.state == "held"
@@ -62,7 +64,8 @@ def hold_with_engines_on(arm: Arm, hand: HandOnPage, *hands: Callable[[], None])
     while True:
         hand.hold(*hands)
         arm.record.turn_on(is_held)
-        arm.record.until(lambda: len(arm.record.beats_after(begin)) >= 3 or not is_held(), period=0.05)
+        on = time.time()
+        arm.record.until(lambda on=on: len(arm.record.beats_after(on)) >= 3 or not is_held(), period=0.05)
         if is_held():
             return
 

@@ -32,8 +32,8 @@ RECORDING = """
 window.sent = [];
 window.WebSocket = class extends WebSocket {
     send(text) {
-        const { type, nonce } = JSON.parse(text);
-        sent.push({ type, nonce, at: Date.now() });
+        const { type, nonce, name } = JSON.parse(text);
+        sent.push({ type, nonce, name, at: Date.now() });
         super.send(text);
     }
 };
@@ -66,7 +66,7 @@ window.pad = {
     get timestamp() { return this.frozen ?? performance.now(); },
 };
 navigator.getGamepads = () => [pad];
-window.tell = (type) => dispatchEvent(Object.assign(new Event(type), { gamepad: pad }));
+window.announce = (type) => dispatchEvent(Object.assign(new Event(type), { gamepad: pad }));
 """
 """A gamepad, until it has `frozen`."""
 

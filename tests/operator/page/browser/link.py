@@ -11,8 +11,10 @@ import time
 class Link:
     """Passes on bytes between the clients of an address and a server, or lets them wait."""
 
-    def __init__(self, address: str, server: tuple[str, int]) -> None:
+    def __init__(self, address: str, server: tuple[str, int], path: bytes = b"/") -> None:
+        """:param path: below which the page lies for clients, as behind a reverse proxy."""
         self._server = server
+        self._path = path
         self._from_page, self._from_server = threading.Event(), threading.Event()
         self._sockets: list[socket.socket] = []
         self._threads: list[threading.Thread] = []
@@ -61,14 +63,18 @@ class Link:
                     continue
                 server.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, True)
                 self._sockets.append(server)
-                self._start(self._pass_on, page, server, self._from_page)
+                self._start(self._pass_on, page, server, self._from_page, b"GET " + self._path)
                 self._start(self._pass_on, server, page, self._from_server)
 
     @staticmethod
-    def _pass_on(source: socket.socket, target: socket.socket, gate: threading.Event) -> None:
+    def _pass_on(
+        source: socket.socket, target: socket.socket, gate: threading.Event, request: bytes = b""
+    ) -> None:
         with contextlib.suppress(OSError):
             while data := source.recv(65536):
                 gate.wait()
+                if request and data.startswith(request):
+                    data = b"GET /" + data[len(request) :]
                 target.sendall(data)
         gate.wait()
         with contextlib.suppress(OSError):

@@ -17,8 +17,9 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
+from deploy.supervision.processes import ROOT
 from interfaces import topics
-from tests.system.sites import LIMIT, ROOT, Peer
+from tests.system.sites import LIMIT, Peer
 
 DEPTH = 500  # messages that may wait while this process is not scheduled
 RECORDED = (topics.OPERATOR_HEARTBEAT, topics.ENGINES_STATE)

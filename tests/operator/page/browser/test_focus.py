@@ -109,7 +109,7 @@ def test_tab_that_gives_way_to_another_releases(arm: Arm, hand: HandAtDesktop) -
 
 @undisturbed
 def test_gamepad_holds_no_page_in_the_background(arm: Arm, hand: HandAtDesktop) -> None:
-    hand.page.evaluate("tell('gamepadconnected')")
+    hand.page.evaluate("announce('gamepadconnected')")
     time.sleep(0.2)
     with hand.desktop.other_window():
         hand.until("!document.hasFocus()")

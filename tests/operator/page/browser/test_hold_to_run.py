@@ -104,7 +104,7 @@ def test_released_trigger_of_a_gamepad_releases(arm: Arm, hand: HandOnPage) -> N
     assert not hand.stalled
 
     hand.hold(lambda: trigger(1), lambda: trigger(0))
-    hand.page.evaluate("tell('gamepaddisconnected')")
+    hand.page.evaluate("announce('gamepaddisconnected')")
     hand.await_state("released")
     arm.record.silence_after(time.time())
     assert hand.why == "Released: the gamepad was disconnected."
@@ -116,7 +116,7 @@ def test_gamepad_that_has_frozen_releases(arm: Arm, hand: HandOnPage) -> None:
     trigger = connected_trigger(hand)
     hand.hold(lambda: trigger(1), lambda: trigger(0))
     time.sleep(6.0)
-    assert hand.state == "held", "a gamepad that tells something new holds on"
+    assert hand.state == "held", "a gamepad that reports something new holds on"
     hand.page.evaluate("pad.frozen = 1")
     hand.await_state("released")
     arm.record.silence_after(time.time())
@@ -129,8 +129,8 @@ def test_gamepad_that_has_frozen_releases(arm: Arm, hand: HandOnPage) -> None:
 @pytest.mark.parametrize("hand", [PAD], indirect=True, ids=["pad"])
 @undisturbed
 def test_gamepad_without_triggers_holds_up_nothing(arm: Arm, hand: HandOnPage) -> None:
-    hand.page.evaluate("pad.buttons.length = 2; tell('gamepadconnected')")
-    hand.page.wait_for_timeout(200)
+    hand.page.evaluate("pad.buttons.length = 2; pad.mapping = ''; announce('gamepadconnected')")
+    hand.page.wait_for_selector("#hold-why:text('use mouse, finger or key')")
     assert hand.errors == []
     hold_with_engines_on(arm, hand)
 
@@ -142,15 +142,16 @@ def connected_trigger(hand: HandOnPage) -> Callable[[float], None]:
         hand.page.evaluate("way => { pad.buttons[7].value = way; }", way)
         hand.page.wait_for_timeout(100)
 
-    hand.page.evaluate("tell('gamepadconnected')")
+    hand.page.evaluate("announce('gamepadconnected')")
     trigger(0)
     return trigger
 
 
 PEN = """
 hold.setPointerCapture = () => {};
+const { x: clientX, y: clientY } = hold.getBoundingClientRect();
 window.pen = (type, buttons) => hold.dispatchEvent(
-    new PointerEvent(type, { pointerId: 7, pointerType: "pen", button: 0, buttons })
+    new PointerEvent(type, { pointerId: 7, pointerType: "pen", button: 0, buttons, clientX, clientY })
 );
 """
 
@@ -168,6 +169,81 @@ def test_pen_that_hovers_after_a_lost_release_releases(arm: Arm, hand: HandOnPag
     hand.await_state("released")
     arm.record.silence_after(time.time())
     assert not hand.stalled
+
+
+@undisturbed
+def test_mouse_that_moves_on_a_selection_holds_on(arm: Arm, hand: HandOnPage) -> None:
+    hand.page.keyboard.press("Control+a")
+    hold_with_engines_on(arm, hand)
+    x, y = hand.point()
+    for step in range(20):
+        hand.page.mouse.move(x + 4 * step, y)
+    arm.record.await_beats(time.time(), 5)
+    assert hand.state == "held"
+
+
+@undisturbed
+def test_mouse_that_slides_off_the_button_releases(arm: Arm, hand: HandOnPage) -> None:
+    hold_with_engines_on(arm, hand)
+    box = hand.page.locator("#hold").bounding_box()
+    hand.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] + 20)
+    hand.await_state("released")
+    arm.record.silence_after(time.time())
+    assert hand.why == "Released: the hand slid off the button."
+    hand.up()
+    hand.page.mouse.down()
+    hand.page.mouse.move(*hand.point())  # a drag
+    hand.page.wait_for_selector("#hold-why:text('A drag holds nothing')")
+    assert hand.state == "released"
+
+
+def turn_off(hand: HandOnPage) -> None:
+    """Let the engines be off, which another test may have left on."""
+    hand.page.click("#turn-off")
+    hand.page.wait_for_selector("#engines[data-state=off]")
+
+
+@undisturbed
+def test_mouse_alone_turns_the_engines_on(arm: Arm, hand: HandOnPage) -> None:
+    turn_off(hand)
+    hand.page.click("#turn-on")
+    hand.page.wait_for_selector("#engines-refused:text('Now hold the button')")
+    assert hand.sent("engines") == 1
+    hand.page.wait_for_selector("#engines-refused:text('nobody holds')")
+    assert hand.page.get_attribute("#turn-off", "data-stops") is None
+    hand.page.click("#turn-on")
+    hand.hold()
+    hand.page.wait_for_selector("#engines[data-state=on]")
+    assert hand.page.get_attribute("#turn-off", "data-stops") == "yes"  # it stands out
+    hand.page.wait_for_selector("#arm[data-power=on]")
+    assert hand.state == "held"
+    assert not hand.stalled
+
+
+@undisturbed
+def test_key_turns_the_engines_on_while_a_mouse_holds(arm: Arm, hand: HandOnPage) -> None:
+    turn_off(hand)
+    hand.hold()
+    hand.page.wait_for_selector("#operator[data-state=seen]")
+    hand.page.keyboard.press("Enter")
+    hand.page.wait_for_selector("#engines[data-state=on]")
+    assert hand.state == "held"
+    assert not hand.stalled
+
+
+LOCK = """
+const say = (isLocked) => document.body.setAttribute("data-locked", isLocked);
+navigator.wakeLock.request = async () => (say("yes"), { release: () => say("no") });
+"""
+
+
+@undisturbed
+def test_screen_stays_on_while_a_hand_holds(arm: Arm, hand: HandOnPage) -> None:
+    hand.page.evaluate(LOCK)
+    hand.hold()
+    hand.page.wait_for_selector("[data-locked=yes]")
+    hand.up()
+    hand.page.wait_for_selector("[data-locked=no]")
 
 
 @undisturbed
@@ -198,7 +274,7 @@ document.dispatchEvent(new Event("visibilitychange"));
 LOST = {
     "hidden page": (HIDDEN, "the page was hidden"),
     "context menu": ("hold.dispatchEvent(new MouseEvent('contextmenu', {bubbles: true}))", "context menu"),
-    "pointer cancelled": ("hold.dispatchEvent(new PointerEvent('pointercancel', {pointerId: 1}))", ""),
+    "pointer cancelled": ("hold.dispatchEvent(new PointerEvent('pointercancel', {pointerId: 1}))", "gesture"),
     "lost capture": ("hold.releasePointerCapture(1)", ""),
     "page left": ("dispatchEvent(new Event('pagehide'))", ""),
     "page put to sleep": ("document.dispatchEvent(new Event('freeze'))", "put to sleep"),

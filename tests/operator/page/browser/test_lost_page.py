@@ -30,9 +30,8 @@ LATE = 0.4  # s for which a page goes on: the server still talks to it
 
 def test_engines_stop_in_time_after_the_browser_is_killed(arm: Arm, own_browser: Any) -> None:
     hand = HandOnPage(own_browser.new_context(), arm.url)
-    hold_with_engines_on(arm, hand)
     pids = chromium.processes_of(own_browser)
-    arm.record.await_beats(time.time())
+    hold_with_engines_on(arm, hand)
     chromium.signal_all(pids, signal.SIGKILL)
     killed = time.time()
     arm.record.silence_after(killed + GONE)
@@ -48,7 +47,6 @@ def test_suspended_browser_releases_and_resumes_released(arm: Arm, own_browser: 
     hand = HandOnPage(own_browser.new_context(), arm.url)
     pids = chromium.processes_of(own_browser)
     hold_with_engines_on(arm, hand)
-    arm.record.await_beats(time.time())
     try:
         chromium.signal_all(pids, signal.SIGSTOP)
         stopped = time.time()

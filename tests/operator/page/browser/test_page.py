@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
+import signal
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 from std_msgs.msg import Float64
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
+from deploy.operator.page.server import MAX_PAGES
 from deploy.supervision import manifest
 from interfaces import topics
+from tests.system.records import engine_states
 from tests.system.sites import LIMIT, Peer
 
 from .arm import LINK, Arm, hold_with_engines_on
@@ -20,7 +30,7 @@ from .link import Link
 
 pytestmark = pytest.mark.timed
 
-WIDTHS = {320: 568, 390: 844, 844: 390, 1280: 800, 3840: 2160}
+WIDTHS = {320: 568, 360: 640, 390: 844, 640: 400, 844: 390, 1280: 800, 3840: 2160}
 TARGET = 44  # px
 LEGIBLE = 11  # px, the height of the letters' box
 CONTROLS = ("button", "slider", "spinbutton")
@@ -68,6 +78,22 @@ BEYOND = """
 """
 """The elements that reach beyond the right edge, even where they are cut off."""
 
+CUT_OFF = """
+[...document.querySelectorAll("#hold, #turn-on, #turn-off, #health, #connection")].filter((it) =>
+    it.scrollWidth > it.clientWidth + 1 || it.scrollHeight > it.clientHeight + 1
+).map((it) => `${it.id} ${it.textContent}`)
+"""
+"""The controls whose text reaches beyond them."""
+
+COVERED = """
+["hold", "turn-on", "turn-off"].filter((id) => {
+    const it = document.getElementById(id);
+    const { x, y, width, height } = it.getBoundingClientRect();
+    return !it.contains(document.elementFromPoint(x + width / 2, y + height / 2));
+})
+"""
+"""The controls that something lies upon."""
+
 SMALL = """
 (least) => [...document.querySelectorAll("button, input, a")].filter((it) =>
     it.checkVisibility() && !it.matches(".skip")
@@ -76,6 +102,25 @@ SMALL = """
 ).map(([name, { width, height }]) => `${name} ${width} ${height}`)
 """
 """The controls that are smaller than a size [px]."""
+
+NO_STORAGE = """
+Object.defineProperty(window, "sessionStorage", { get() { throw new DOMException("", "SecurityError"); } });
+"""
+
+HEALTH = """
+[
+    document.getElementById("health-text").textContent,
+    document.querySelectorAll("#processes tr[data-ok=yes][data-state=running]").length,
+    document.querySelectorAll("#processes tbody tr").length,
+]
+"""
+
+BREAK = """
+() => new MutationObserver(() => document.body.setAttribute("data-breaks", "yes")).observe(
+    document.querySelector("[data-node=controller]"), { attributeFilter: ["data-away"] },
+)
+"""
+"""Notes whether the drawing of the chain breaks, however shortly."""
 
 INLINE = """
 window.violations = [];
@@ -106,10 +151,7 @@ def test_page_fits_into_every_width(shared: HandOnPage, width: int) -> None:
         "document.documentElement.scrollWidth <= document.documentElement.clientWidth"
     )
     assert shared.page.evaluate(BEYOND) == []
-    box = shared.page.locator("#hold").bounding_box()
-    assert box["x"] >= 0
-    assert box["x"] + box["width"] <= width
-    assert 0 <= box["y"] <= WIDTHS[width] - box["height"], "the button is in sight"
+    assert shared.page.evaluate(CUT_OFF) == []
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -119,21 +161,31 @@ def test_every_control_is_large_enough_for_a_finger(shared: HandOnPage, width: i
     assert shared.page.evaluate(SMALL, TARGET) == []
 
 
-def test_phone_on_its_side_shows_button_engines_and_axes(shared: HandOnPage) -> None:
-    shared.page.set_viewport_size({"width": 844, "height": 390})
-    shared.await_drawing()
-    for top in (0, 600):  # the page is scrolled to the processes, say
+@pytest.mark.parametrize("width", WIDTHS)
+def test_hand_and_engines_stay_at_their_place(shared: HandOnPage, width: int) -> None:
+    shared.page.set_viewport_size({"width": width, "height": WIDTHS[width]})
+    places = []
+    for top in (0, 300, 1e6):
         shared.page.evaluate("top => scrollTo(0, top)", top)
         shared.await_drawing()
-        for control in ("#hold", "#turn-on", "#turn-off"):
-            box = shared.page.locator(control).bounding_box()
-            assert 0 <= box["y"] <= 390 - box["height"], control
+        boxes = [shared.page.locator(it).bounding_box() for it in ("#hold", "#turn-on", "#turn-off")]
+        for box in boxes:
+            assert 0 <= box["y"] <= WIDTHS[width] - box["height"]
+            assert 0 <= box["x"] <= width - box["width"]
+        places.append(boxes)
+        assert shared.page.evaluate(COVERED) == []
+    shared.page.evaluate("scrollTo(0, 0)")
+    assert width >= 700 or places[0] == places[1] == places[2]
+
+
+def test_phone_on_its_side_shows_axes(shared: HandOnPage) -> None:
+    shared.page.set_viewport_size({"width": 844, "height": 390})
+    shared.await_drawing()
     heights = shared.page.evaluate(
         "[...document.querySelectorAll('#arm .ticks text')].map((it) => it.getBoundingClientRect().height)"
     )
     assert heights
     assert min(heights) >= LEGIBLE
-    shared.page.evaluate("scrollTo(0, 0)")
 
 
 def test_every_control_has_a_name(shared: HandOnPage) -> None:
@@ -145,9 +197,9 @@ def test_every_control_has_a_name(shared: HandOnPage) -> None:
         if role in NAMED and not node["ignored"]:
             names[role].append(node.get("name", {}).get("value", ""))
     assert {role for role in NAMED if "" in names[role]} == set()
-    assert [len(names[role]) for role in CONTROLS] == [8 + 2 * len(manifest.programs()), 4, 4]
+    assert [len(names[role]) for role in CONTROLS] == [13 + 2 * len(manifest.programs()), 4, 4]
     for role in CONTROLS:
-        assert len(set(names[role])) == len(names[role]), "each name tells which control it is"
+        assert len(set(names[role])) == len(names[role]), "each name says which control it is"
 
 
 def test_page_runs_no_foreign_script(shared: HandOnPage) -> None:
@@ -186,8 +238,12 @@ def test_keyboard_alone_moves_the_arm_and_kills_a_process(arm: Arm, hand: HandOn
         keyboard.press("ArrowRight")
     hand.page.wait_for_selector("#source-theta1[data-source=hand]", timeout=WAIT)
     tab_to(hand, "#follow-scenario")
-    keyboard.press("Enter")
+    keyboard.press("Enter")  # too short: the arm would jump
+    hand.page.wait_for_selector("#set-note:text('jumps')", timeout=WAIT)
+    assert hand.sent("follow_scenario") == 0
+    keyboard.down("Enter")
     hand.page.wait_for_selector("#source-theta1[data-source=scenario]", timeout=WAIT)
+    keyboard.up("Enter")
 
     killed = arm.site.members["kinematics"]
     tab_to(hand, "tr[data-process=kinematics] [data-action=kill]")
@@ -203,6 +259,90 @@ def test_keyboard_alone_moves_the_arm_and_kills_a_process(arm: Arm, hand: HandOn
         keyboard.up("Enter")
     hand.page.wait_for_selector("tr[data-process=kinematics][data-back=yes]", timeout=WAIT)
     assert hand.errors == []
+
+
+def test_slider_moves_the_arm_no_faster_than_a_hand(arm: Arm, hand: HandOnPage) -> None:
+    hand.page.wait_for_selector("#set-theta1:enabled", timeout=WAIT)
+    begin = time.monotonic()
+    hand.page.fill("#number-theta1", "1")
+    hand.page.press("#number-theta1", "Enter")
+    hand.page.wait_for_selector("#arm[data-power=moved] .power:text('engines off')", timeout=WAIT)
+    hand.page.wait_for_selector("#arm .angle-label:text('57.3°')", timeout=WAIT)
+    assert time.monotonic() - begin > 0.8  # 1 rad at 1 rad/s
+    assert hand.sent("set") >= 9
+    hand.page.wait_for_selector("#arm[data-power=off]", timeout=WAIT)
+    for _ in range(2):
+        hand.page.evaluate("document.getElementById('follow-scenario').click()")
+    hand.page.wait_for_selector("#source-theta1[data-source=scenario]", timeout=WAIT)
+
+
+def test_node_that_is_killed_in_the_drawing_heals(arm: Arm, hand: HandOnPage) -> None:
+    hold_with_engines_on(arm, hand)
+    for node in ("hand", "watchdog", "controller"):
+        hand.page.wait_for_selector(f"[data-node={node}] .strong[d*=M]", state="attached", timeout=WAIT)
+    killed = arm.site.members["engine_controller"]
+    hand.page.focus("[data-node=controller] button")
+    hand.page.wait_for_selector("[data-node=drive][data-acts]", timeout=WAIT)
+    assert "the drive stands still after 0.4 s" in (hand.page.text_content("#chain-safe") or "")
+    hand.page.evaluate(BREAK)
+    hand.page.keyboard.down("Enter")
+    hand.page.wait_for_selector("body[data-breaks]", timeout=WAIT)
+    hand.page.keyboard.up("Enter")
+    hand.page.wait_for_selector("[data-node=controller] .stamp:text-matches('back in [01]')", timeout=WAIT)
+    hand.page.wait_for_selector("[data-node=controller] .strong:not([d*=M])", state="attached", timeout=WAIT)
+    hand.page.wait_for_selector("[data-node=controller] .weak[d*=M]", state="attached", timeout=WAIT)
+    assert arm.site.members["engine_controller"] != killed
+    assert hand.errors == []
+
+
+def test_phone_tells_who_is_the_hand(hand: HandOnPage) -> None:
+    hand.page.set_viewport_size({"width": 360, "height": 640})
+    hand.hold()
+    hand.page.wait_for_selector("#mini-operator:visible:text('You hold')", timeout=WAIT)
+    hand.up()
+    hand.page.wait_for_selector("#mini-operator:visible:text('Operator')", timeout=WAIT)
+
+
+def test_last_stop_is_replayed_until_a_hand_holds(arm: Arm, hand: HandOnPage) -> None:
+    hold_with_engines_on(arm, hand)
+    hand.page.wait_for_selector("#engines[data-state=on]", timeout=WAIT)
+    hand.up()
+    hand.page.click("#turn-off")
+    replay_until(hand, "#arm[data-power=on]")
+    assert hand.page.is_hidden("#record")
+    assert hand.page.get_attribute("#engines", "data-state") == "off", (
+        "the rest of the page shows what is now"
+    )
+    hand.hold()
+    hand.page.wait_for_selector("html:not([data-replay]) #arm[data-power=off]", timeout=WAIT)
+    assert hand.errors == []
+
+
+def test_replay_links_its_record(arm: Arm, hand: HandOnPage, tmp_path: Path) -> None:
+    recorder = arm.site.begin("record", "10")
+    ring = Path(recorder.await_line("Recording to (/.*/ring)")[1])
+    hold_with_engines_on(arm, hand)
+    arm.record.until(lambda: any(engine_states(path).count(topics.ON) > 5 for path in ring.iterdir()))
+    hand.up()
+    hand.page.click("#turn-off")
+    replay_until(hand, "#record:text('Save its record, stop-')")
+    with hand.page.expect_download(timeout=WAIT) as download:
+        hand.page.click("#record", timeout=WAIT)
+    download.value.save_as(tmp_path / "stop.mcap")
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0
+    assert set(engine_states(tmp_path / "stop.mcap")) == {topics.ON, topics.OFF}
+    assert hand.errors == []
+
+
+def replay_until(hand: HandOnPage, selector: str) -> None:
+    """Replay the last stop until something is shown; a machine that stands still ends a replay."""
+    deadline = time.monotonic() + LIMIT
+    while not hand.page.is_visible(f"html[data-replay=yes] {selector}"):
+        assert time.monotonic() < deadline, f"no replay shows {selector}"
+        if hand.page.get_attribute("html", "data-replay") is None:
+            hand.page.click("#rewind", timeout=WAIT)
+        hand.page.wait_for_timeout(50)
 
 
 def is_disconnected(hand: HandOnPage) -> bool:
@@ -244,6 +384,110 @@ def test_page_shows_real_joints_and_does_not_set_them(
         assert hand.errors == []
 
 
+def test_page_lies_under_a_path_of_a_reverse_proxy(arm: Arm, browser: Any) -> None:
+    with (
+        closing(Link(LINK, ("127.0.0.1", arm.port), b"/robots/arm/")),
+        closing(browser.new_context()) as context,
+    ):
+        address, _, token = arm.url.replace("127.0.0.1", LINK).partition("#")
+        hand = HandOnPage(context, f"{address}robots/arm/#{token}")
+        hand.page.wait_for_selector("tr[data-process=kinematics][data-ok=yes]", timeout=WAIT)
+        assert hand.errors == []
+
+
+@pytest.mark.parametrize("hand", [NO_STORAGE], indirect=True)
+def test_page_works_where_the_browser_stores_nothing(hand: HandOnPage) -> None:
+    assert hand.errors == []
+    hand.page.reload()
+    hand.await_live()  # the address keeps the token
+
+
+def test_page_that_is_one_too_many_says_so_and_opens_when_another_closes(arm: Arm, browser: Any) -> None:
+    with ExitStack() as opened, closing(browser.new_context()) as context:
+        pages = []
+        with suppress(ConnectionClosed):
+            while len(pages) <= MAX_PAGES:
+                pages.append(opened.enter_context(connected(arm)))
+        page = context.new_page()
+        page.goto(arm.url)
+        page.wait_for_selector("#banner-text:text('8 pages are open already')", timeout=WAIT)
+        assert page.text_content("#connection-text") == "Not connected"
+        pages[0].close()
+        page.wait_for_selector("html[data-connection=live]", timeout=WAIT)
+        assert page.is_hidden("#banner")
+
+
+@contextmanager
+def connected(arm: Arm) -> Iterator[ClientConnection]:
+    """Open the connection of a page that answers."""
+    base, _, token = arm.url.partition("#")
+    with connect(f"{base.replace('http', 'ws')}socket", origin=Origin(base.rstrip("/"))) as page:
+        page.send(json.dumps({"type": "hello", "token": token}))
+        assert json.loads(page.recv(LIMIT))["type"] == "welcome"
+        yield page
+
+
+def test_stopped_motion_leaves_no_speed(arm: Arm, hand: HandOnPage) -> None:
+    hand.page.wait_for_selector("#speed:text('0.00')", timeout=WAIT)
+    hand.page.wait_for_selector("#x:not(:text('–'))", timeout=WAIT)
+    process = arm.site.members["twist"]
+    os.kill(process, signal.SIGSTOP)
+    try:
+        for name in ("speed", "x", "y"):
+            hand.page.wait_for_selector(f"#{name}:text('–')", timeout=WAIT)
+        hand.page.wait_for_selector("#arm [data-heard=no]", timeout=WAIT)
+        hand.page.wait_for_selector(".slider[data-heard=no] #set-theta1", timeout=WAIT)
+        assert hand.page.input_value("#number-theta1") == ""
+    finally:
+        os.kill(process, signal.SIGCONT)
+    hand.page.wait_for_selector("#speed:text('0.00')", timeout=WAIT)
+    hand.page.wait_for_selector("#arm [data-heard=yes]", timeout=WAIT)
+
+
+def test_header_counts_who_is_well_and_leads_to_who_is_not(arm: Arm, hand: HandOnPage) -> None:
+    os.kill(arm.site.members["robot_state"], signal.SIGSTOP)  # until the sentinel replaces it
+    hand.page.wait_for_selector("tr[data-process=robot_state][data-ok=no]", timeout=WAIT)
+    text, well, rows = hand.page.evaluate(HEALTH)
+    assert well < rows
+    assert text == f"{well} of {rows} ok"
+    hand.page.click("#health")
+    box = hand.page.locator("#processes tr[data-ok=no]").first.bounding_box()
+    assert 0 < box["y"] < hand.page.viewport_size["height"]
+    hand.page.wait_for_selector("tr[data-process=robot_state][data-ok=yes]", timeout=WAIT)
+
+
+def test_page_that_does_not_start_says_so(arm: Arm, browser: Any) -> None:
+    with closing(browser.new_context()) as context:
+        context.route("**/static/main.js", lambda route: route.fulfill(body="import './nothing.js';"))
+        context.route("**/static/reload.js", lambda route: route.fulfill(body=""))
+        page = context.new_page()
+        page.goto(arm.url)
+        assert page.is_visible("#banner")
+        assert "No word from the arm yet." in (page.text_content("#banner-text") or "")
+        assert "Connecting" not in (page.text_content("header") or "")
+
+
+def test_error_of_the_page_is_shown_and_in_the_log_once(arm: Arm, hand: HandOnPage) -> None:
+    assert hand.page.is_hidden("#fault")
+    for _ in range(3):
+        hand.page.evaluate("setTimeout(() => nothing(1))")
+        hand.page.evaluate("Promise.reject(new Error('broken \\u001b[31m promise')) && null")
+    hand.page.wait_for_selector(
+        "#fault:has-text('broken'):has-text('may show what is not true')", timeout=WAIT
+    )
+    for width, height in WIDTHS.items():
+        hand.page.set_viewport_size({"width": width, "height": height})
+        hand.await_drawing()
+        assert hand.page.evaluate(COVERED) == []
+    log = arm.site.run / "logs" / "operator_page.log"
+    expected = ("a page: ReferenceError: nothing is not defined", "a page: Error: broken [31m promise")
+    arm.record.until(lambda: all(words in log.read_text() for words in expected))
+    hand.page.evaluate("setTimeout(() => last())")
+    arm.record.until(lambda: "last is not defined" in log.read_text())
+    assert [log.read_text().count(words) for words in expected] == [1, 1]
+    hand.errors.clear()
+
+
 def test_page_turns_grey_within_500_ms(arm: Arm, browser: Any, link: Link) -> None:
     with closing(browser.new_context()) as context:
         hand = HandOnPage(context, arm.url.replace("127.0.0.1", LINK), TIMING)
@@ -258,6 +502,12 @@ def test_page_turns_grey_within_500_ms(arm: Arm, browser: Any, link: Link) -> No
         hand.page.wait_for_selector("html[data-connection=lost]")
         assert hand.page.is_visible("#banner")
         assert "Connection lost since" in (hand.page.text_content("#banner-text") or "")
+        shown = hand.page.text_content("#banner-age") or ""
+        assert re.match(r"The engines stop by \d\d:\d\d:\d\d at the latest", shown)
+        for name in ("speed", "x", "y"):
+            assert hand.page.text_content(f"#{name}") == "–"
+        assert hand.page.get_attribute("#engines", "data-state") == "unknown"
+        assert hand.page.get_attribute("tr[data-process=kinematics]", "data-state") == "unknown"
         assert hand.page.get_attribute("#turn-on", "aria-disabled") == "true"
         assert hand.page.is_disabled("#set-l1")
         assert hand.state == "offline"
