@@ -22,9 +22,71 @@ GUARDS: dict[str, tuple[str, ...]] = {
     "services/engine_controller.py": (
         "tests/component/test_engine_controller.py",
         "tests/component/test_engine_controller_wiring.py",
+        "tests/component/test_engine_causes.py",
         "tests/component/test_readme.py",
     ),
+    "interfaces/activity.py": (
+        "tests/component/test_operator_watchdog.py",
+        "tests/component/test_operator_watchdog_wiring.py",
+    ),
+    "interfaces/latch.py": (
+        "tests/component/test_engine_controller.py",
+        "tests/component/test_engine_causes.py",
+    ),
+    "interfaces/explanation.py": ("tests/component/test_engine_causes.py",),
+    "interfaces/cause.py": ("tests/component/test_engine_causes.py",),
     "services/drive.py": ("tests/component/test_drive.py",),
+    "services/dead_mans_switch.py": (
+        "tests/component/test_dead_mans_switch.py",
+        "tests/component/test_virtual_source.py",
+        "tests/component/test_scenario.py",
+        "tests/component/test_readme.py",
+    ),
+    "services/config_publisher.py": (
+        "tests/component/test_config_publisher.py",
+        "tests/component/test_virtual_source.py",
+        "tests/component/test_drive.py",
+        "tests/component/test_readme.py",
+    ),
+    "services/kinematics.py": (
+        "tests/component/test_kinematics.py",
+        "tests/component/test_effector_wiring.py",
+    ),
+    "services/velocity.py": (
+        "tests/component/test_velocity.py",
+        "tests/component/test_effector_wiring.py",
+    ),
+    "services/examples/speed_guard.py": (
+        "tests/component/test_speed_guard.py",
+        "tests/component/test_speed_guard_wiring.py",
+    ),
+    "services/examples/twist_gate.py": ("tests/component/test_twist_gate.py",),
+    "services/examples/drive_adapter.py": ("tests/component/test_drive_adapter.py",),
+    "services/examples/joint_source.py": (
+        "tests/component/test_joint_source.py",
+        "tests/component/test_simulated_time.py",
+    ),
+    "interfaces/drive_file.py": (
+        "tests/component/test_drive_file.py",
+        "tests/component/test_drive_adapter.py",
+    ),
+    "services/robot_state.py": ("tests/component/test_robot_state.py", "tests/component/test_readme.py"),
+    "services/twist.py": ("tests/component/test_twist.py", "tests/component/test_readme.py"),
+    "deploy/operator/hold.py": ("tests/operator/test_hold.py",),
+    "deploy/operator/hand.py": (
+        "tests/operator/test_terminal_commands.py",
+        "tests/component/test_strangers.py",
+    ),
+    "deploy/operator/switch.py": (
+        "tests/operator/test_switch.py",
+        "tests/operator/test_terminal_commands.py",
+        "tests/operator/page/test_operator_page.py",
+    ),
+    "deploy/operator/holder.py": ("tests/operator/test_holder.py",),
+    "interfaces/sources/driving.py": (
+        "tests/component/test_driving.py",
+        "tests/component/test_drive.py",
+    ),
     "deploy/supervision/reaction.py": (
         "tests/supervision/test_reaction.py",
         "tests/supervision/test_parameter_file.py",
@@ -43,6 +105,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
     "interfaces/service/clocks.py": (
         "tests/component/test_clocks.py",
         "tests/component/test_engine_controller_wiring.py",
+        "tests/component/test_engine_causes.py",
         "tests/commands/test_hosts.py",
     ),
     "interfaces/service/health.py": (
@@ -109,6 +172,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
     "tests/promises/history.py": ("tests/promises/test_history.py", *_CHECKERS),
     "tests/promises/effects.py": ("tests/promises/test_effects.py", *_CHECKERS),
     "tests/promises/promises.py": ("tests/promises/test_checkers.py", "tests/promises/test_reports.py"),
+    "tests/promises/claims.py": ("tests/promises/test_claims.py", *_CHECKERS),
     "tests/promises/safety.py": _CHECKERS,
     "tests/promises/drive.py": ("tests/promises/test_drive.py",),
     "tests/promises/liveness.py": _CHECKERS,

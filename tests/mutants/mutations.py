@@ -1,7 +1,7 @@
 """The mutants of a module, made by the operators of mutmut and a few of our own.
 
 Ours stay: mutmut 3 neither negates a condition nor leaves a call out, and these are the likely bugs of a
-fail-safe. For the others, ours drop the variants that no test can tell apart.
+fail-safe. For the others, ours drop the variants that no test can distinguish.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _arguments(node: cst.Call) -> Iterator[cst.Call]:
 
 
 def _assignment(node: cst.Assign | cst.AnnAssign) -> Iterator[cst.CSTNode]:
-    """Assign None, but do not replace another false value: hardly any code tells them apart."""
+    """Assign None, but do not replace another false value: hardly any code distinguishes them."""
     if node.value is not None and not m.matches(node.value, m.Name("None") | m.Name("False")):
         yield from mutators.operator_assignment(node)
 
