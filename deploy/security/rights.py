@@ -1,4 +1,4 @@
-"""What each process of an arm may do in DDS: the rights of its enclave follow from the contract.
+"""The rights of each process of an arm in DDS: those of its enclave follow from the contract.
 
 Names are those of DDS (``rt/engines``). ``*`` stands for any characters, ``/`` included.
 """
@@ -19,7 +19,7 @@ RECORDER = "recorder"
 TOOLS = "tools"
 """The enclave for `ros2`, RViz and Foxglove."""
 GRAPH = "ros_discovery_info"
-"""The topic on which each process tells others of its nodes."""
+"""The topic on which each process announces its nodes."""
 _READ_PARAMETERS = (
     "describe_parameters",
     "get_parameter_types",

@@ -22,8 +22,8 @@ ENCLAVE = {
     "enclaves/talker/identity_ca.cert.pem": "../../public/identity_ca.cert.pem",
     "enclaves/talker/permissions_ca.cert.pem": "../../public/permissions_ca.cert.pem",
 }
-CA_SUBJECT = "CN = sros2CA"
-SUBJECT = "CN = /talker"
+CA_SUBJECT = "CN=sros2CA"
+SUBJECT = "CN=/talker"
 DAYS_BEFORE, DAYS_AFTER = 1, 3650
 """The validity of a certificate, from its making."""
 SIGNED = (

@@ -73,7 +73,7 @@ def test_certificates_are_those_of_sros2(made: Keystore) -> None:
         (ca, sros2.CA_SUBJECT, "X509v3 Basic Constraints: critical\n                CA:TRUE, pathlen:1"),
         (own, sros2.SUBJECT, "X509v3 Basic Constraints: \n                CA:FALSE"),
     ):
-        text = openssl("x509", "-in", certificate, "-noout", "-text")
+        text = openssl("x509", "-in", certificate, "-noout", "-text", "-nameopt", "RFC2253")
         assert f"Issuer: {sros2.CA_SUBJECT}\n" in text
         assert f"Subject: {subject}\n" in text
         assert constraints in text

@@ -18,10 +18,11 @@ from deploy.security.keystore import Keystore
 from deploy.supervision import manifest
 from deploy.supervision.environment import of_supervisord
 from deploy.supervision.errors import DeploymentError
+from deploy.supervision.processes import ROOT
 from deploy.supervision.system import System
 from interfaces.service import enclave
 from interfaces.service.enclave import Keys
-from tests.system.sites import ROOT, Site
+from tests.system.sites import Site
 
 PROGRAMS = [program.name for program in manifest.programs(manifest.PATH)]
 
@@ -69,18 +70,18 @@ def test_keys_that_have_ended_start_nothing(keystore: Path, tmp_path: Path) -> N
     )
 
 
-def test_terminal_ends_with_its_keys(domain_id: int) -> None:
+def test_terminal_ends_with_its_keys(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = datetime.now(UTC)
+    ended = Keys("/terminal", now - timedelta(days=1), now)
+    monkeypatch.setattr(enclave, "keys", lambda _: ended)
     with Member() as member:
-        member.spin_once()
-        now = datetime.now(UTC)
-        member._keys = Keys("/terminal", now - timedelta(days=1), now)
         for spin in (member.spin_once, member.spin_some):
             with pytest.raises(DeploymentError, match=r"^the keys of /terminal have ended at "):
                 spin()
 
 
 @pytest.mark.parametrize("kind", ["nothing", "a file", "an empty folder", "another governance"])
-def test_what_is_no_keystore_is_told(kind: str, keystore: Path, tmp_path: Path) -> None:
+def test_what_is_no_keystore_is_reported(kind: str, keystore: Path, tmp_path: Path) -> None:
     if kind == "another governance":
         (keystore / "enclaves" / "governance.xml").write_text("<dds")
     else:
@@ -97,7 +98,7 @@ def test_keys_are_for_their_ros_domain(keystore: Path, tmp_path: Path, domain_id
     assert check(tmp_path) == f"{keystore} is for ROS domain 107, 200, not {domain_id}: make keystore"
 
 
-def test_keys_of_another_user_are_told(
+def test_keys_of_another_user_are_reported(
     keystore: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whose = "belongs to another user: an arm starts with keys that its user can read"
@@ -211,7 +212,7 @@ def test_a_program_of_the_user_has_an_enclave(tmp_path: Path, domain_id: int) ->
     own.write_text("[program:twist_gate]\ncommand = python3 -m services.examples.twist_gate\n")
     site = KeyedSite(tmp_path / "run", domain_id)
     done = subprocess.run(
-        site._command(("keystore",)), env=site.environment | {"MANIFEST": str(own)}, cwd=ROOT
+        site.command(("keystore",)), env=site.environment | {"MANIFEST": str(own)}, cwd=ROOT
     )
     assert done.returncode == 0
     assert "/twist_gate" in Keystore(tmp_path / "keys").enclaves()

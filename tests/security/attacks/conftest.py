@@ -17,9 +17,10 @@ from rclpy_ground.cyclonedds import security
 from deploy.security import rights
 from deploy.security.keystore import Keystore
 from deploy.supervision import manifest
+from deploy.supervision.processes import ROOT
 from reactive_node.domains import reserved_domain
 from tests.environment import user_environment
-from tests.system.sites import LIMIT, ROOT, Site
+from tests.system.sites import LIMIT, Site
 
 PROGRAMS = [program.name for program in manifest.programs(manifest.PATH)]
 
@@ -126,7 +127,7 @@ class SecureSite(CycloneSite):
 def secure_site(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int) -> Iterator[SecureSite]:
     """A running arm without a scenario: nobody holds its switch."""
     if security.library(user_environment() | os.environ) is None:
-        pytest.skip("no Cyclone DDS with security: apt-get install libddsc0debian")
+        pytest.skip("no Cyclone DDS with security: apt-get install libddsc0t64")
     with closing(SecureSite(tmp_path_factory.mktemp("secure") / "run", module_domain_id)) as site:
         site.keystore.write(rights.of_arm("/", PROGRAMS), [site.domain])
         start(site)

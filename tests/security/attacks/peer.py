@@ -1,6 +1,6 @@
 """A node that a test commands by lines of JSON: `peer.py NODE [ROS ARGUMENTS]` reads [METHOD, ARGUMENTS…].
 
-It answers with the result, or with {"error": TEXT}. A first line tells whether it could join.
+It answers with the result, or with {"error": TEXT}. A first line says whether it could join.
 """
 
 from __future__ import annotations

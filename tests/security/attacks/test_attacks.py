@@ -472,6 +472,11 @@ def repeat(wire: Wire, watcher: Peer) -> Heard:
     return heard
 
 
+def ports_of(domain: int) -> range:
+    """Return the ports of DDS in a domain."""
+    return range(7400 + 250 * domain, 7650 + 250 * domain)
+
+
 def repeat_an_operator(make_peer: MakePeer, watcher: Peer, wire: Wire, domain: int) -> tuple[Heard, Heard]:
     """Record all packets of a domain, from before an operator joins until it has gone, and repeat them.
 
@@ -480,7 +485,7 @@ def repeat_an_operator(make_peer: MakePeer, watcher: Peer, wire: Wire, domain: i
     for name in (HEARTBEAT, ENGINES):
         watcher("read", name)
     until(lambda: watcher("writers", HEARTBEAT) == 2)  # the virtual switch and the page
-    ports = range(7400 + 250 * domain, 7650 + 250 * domain)  # of DDS
+    ports = ports_of(domain)
     with wire.recording(ports):
         operator = make_peer("terminal_3", "terminal")
         assert "on" in hold_switch_and_turn_on(operator, watcher, 30.0)
@@ -495,6 +500,20 @@ def repeat_an_operator(make_peer: MakePeer, watcher: Peer, wire: Wire, domain: i
         operator.close()
         until(lambda: watcher("writers", HEARTBEAT) == 2)
     return alive, repeat(wire, watcher)
+
+
+def test_keys_hide_messages_but_no_enclaves_and_permissions(
+    secure_site: SecureSite, make_peer: MakePeer, watcher: Peer, wire: Wire
+) -> None:
+    with wire.recording(ports_of(secure_site.domain)):
+        operator = make_peer("terminal_3", "terminal")
+        assert "on" in hold_switch_and_turn_on(operator, watcher, 30.0)
+        operator("publish", ENGINES, "turn_off")
+        until(lambda: watcher("heard", STATE)[-1:] == ["off"])
+    recorded = b"".join(packet for _, packet in wire.packets)
+    assert b"turn_on" not in recorded
+    for shown in (b"/terminal", b"BEGIN CERTIFICATE", b"<allow_rule>", b"rt/engines"):
+        assert shown in recorded
 
 
 def test_repeated_packets_move_nothing(
