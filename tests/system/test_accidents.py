@@ -11,6 +11,14 @@ import pytest
 from interfaces.loopback import LOOPBACK_DOWN
 from tests.system.sites import STEADY, Site
 
+STAYS_IN_THE_GRAPH = """
+import sys, threading
+from deploy.commands import launcher, member
+member.Member.__exit__ = lambda *_: threading.Event().wait()
+launcher.main(["run", sys.argv[1]])
+"""
+"""A terminal whose ROS node never ends."""
+
 
 def test_closing_the_terminal_ends_everything(small_site: Site) -> None:
     terminal = small_site.begin_in_terminal("make", "run", f"SCENARIO={STEADY}")
@@ -30,6 +38,13 @@ def test_nohup_keeps_it_running_when_the_terminal_closes(small_site: Site) -> No
     command.await_line("Turning on engines")
     command.type("quit\n")
     assert command.wait() == 0
+
+
+def test_system_ends_even_if_its_terminal_hangs_at_its_end(small_site: Site) -> None:
+    command = small_site.begin_command(small_site.python, "-c", STAYS_IN_THE_GRAPH, STEADY)
+    command.await_line("Engines are off")
+    command.type("quit\n")
+    small_site.await_members(lambda left: not left)
 
 
 def test_the_end_of_a_pipe_ends_everything(small_site: Site) -> None:

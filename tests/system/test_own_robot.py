@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 from geometry_msgs.msg import Twist, Vector3
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header, String
 
@@ -50,7 +52,8 @@ engine_controller: {{ros__parameters: {{presence_timeout: 2.2}}}}
 class Robot:
     """A base that integrates cmd_vel, the joints of an arm, and a hand on switch and joystick."""
 
-    def __init__(self, peer: Peer) -> None:
+    def __init__(self, peer: Peer, joystick: Peer) -> None:
+        """:param joystick: another node: with the base, it would be a loop around the gate."""
         self.x = 0.0
         """Where the base is [m]."""
         self.holds = False
@@ -60,7 +63,7 @@ class Robot:
         node.create_subscription(Twist, "cmd_vel", self._on_velocity, 1)
         self._beats = peer.publisher(OPERATOR_HEARTBEAT)
         self._commands = peer.publisher(ENGINES)
-        self._joystick = node.create_publisher(Twist, "cmd_vel_in", 1)
+        self._joystick = joystick.node.create_publisher(Twist, "cmd_vel_in", 1)
         self._joints = node.create_publisher(JointState, "/robot/joints", 10)
         node.create_timer(PERIOD, self._on_time)
 
@@ -115,8 +118,9 @@ def running(module_site: Site, pin: Path) -> Iterator[Robot]:
         environment.setenv("WEB", "off")
         code, printed = module_site.do("start", "none", str(pin.parent / "robot.yaml"))
     assert code == 0, printed  # other commands have another environment, as in another terminal
-    with closing(Peer(module_site.domain)) as peer:
-        yield Robot(peer)
+    domain = module_site.domain
+    with closing(Peer(domain)) as peer, closing(Peer(domain, "joystick")) as joystick:
+        yield Robot(peer, joystick)
 
 
 @pytest.fixture
@@ -124,6 +128,21 @@ def robot(running: Robot) -> Robot:
     """The robot with nobody at its switch."""
     running.holds, running.angle = False, 0.5
     return running
+
+
+def test_record_keeps_what_the_programs_of_the_user_publish_and_read(robot: Robot, module_site: Site) -> None:
+    command = module_site.begin("record")
+    command.await_line(r"Recording to /.*\.mcap until Ctrl-C")
+    robot.spin(4.0)  # the recorder looks once a second
+    command.signal(signal.SIGINT)
+    assert command.wait() == 0
+    (path,) = (module_site.run / "records").glob("*.mcap")
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        counts = {
+            it.topic: it.msgcount for it in reader.connections if it.msgtype == "geometry_msgs/msg/Twist"
+        }
+    assert counts.keys() == {"/cmd_vel_in", "/cmd_vel"}
+    assert min(counts.values()) > 10
 
 
 def test_base_moves_only_while_a_hand_holds_the_switch(robot: Robot, pin: Path) -> None:
@@ -144,6 +163,7 @@ def test_base_moves_only_while_a_hand_holds_the_switch(robot: Robot, pin: Path) 
     assert pin.read_text() == "0\n"
 
 
+@pytest.mark.alone  # the traffic of many tests is a flood
 def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, module_site: Site) -> None:
     angles = robot.peer.collect(THETA1)
     robot.spin(1.5)
@@ -155,9 +175,10 @@ def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, modul
     while status.is_alive:
         robot.spin(0.1)
     assert status.wait() == 0
-    rows = {line.split()[0]: line.split() for line in status.output.splitlines()[3:]}
+    table = status.output[status.output.index("SERVICE") :].splitlines()[1:]
+    rows = {line.split()[0]: line.split() for line in table}
     complaints = {name: " ".join(row) for name, row in rows.items() if row[-1] != "ok"}
-    if "sentinel" in complaints:  # it may tell only that this machine is busy
+    if "sentinel" in complaints:  # it may report only that this machine is busy
         assert complaints.pop("sentinel").endswith("the processor has too much to do")
     assert complaints == {}
     assert {"joint_source", "drive_adapter", "twist_gate", "own_guard", "config_l1"} <= rows.keys()

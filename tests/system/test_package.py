@@ -13,7 +13,8 @@ from xml.etree import ElementTree
 import pytest
 
 from deploy.supervision import manifest, processes
-from tests.system.sites import ROOT, Site
+from deploy.supervision.processes import ROOT
+from tests.system.sites import Site
 
 PACKAGE = "reactive_arm"
 
@@ -58,6 +59,7 @@ def test_common_names_stay_out_of_the_import_path_of_the_workspace(prefix: Path)
         PACKAGE,
         "mcap_files",
         "reactive_node",
+        "ros_yaml",
     }
     assert not (prefix / "share" / PACKAGE / "deploy" / "runtime").exists()
 

@@ -16,14 +16,15 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
 from std_msgs.msg import Bool, Float64, String
 
 from deploy.supervision import processes
-from deploy.supervision.rclpy_choice import sourced_rclpy
+from deploy.supervision.processes import ROOT
 from deploy.supervision.system import System
 from interfaces import topics
-from tests.system.sites import LIMIT, ROOT, STEADY, Peer, Site
+from tests.system.sites import LIMIT, STEADY, Peer, Site
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -40,27 +41,32 @@ def rows(table: str) -> dict[str, list[str]]:
     return {row[0]: row[1:] for row in (re.split(r"  +", line) for line in lines)}
 
 
-def status(site: Site, until: Callable[[list[str]], bool]) -> dict[str, list[str]]:
-    """The rows of `make status` once all fulfil a condition: the next report may be a second away."""
+def status(site: Site, until: Callable[[list[str]], bool], *command: str) -> dict[str, list[str]]:
+    """The rows of `make status` once all fulfil a condition: the next report may be a second away.
+
+    :param command: another one that prints the status.
+    """
     deadline = time.monotonic() + LIMIT
     while True:
-        code, printed = site.do("status")
+        code, printed = site.do_command(*command) if command else site.do("status")
         assert code == 0, printed
         services = rows(printed)
         if all(map(until, services.values())) or time.monotonic() > deadline:
             return services
 
 
-def test_status_tells_the_runtime_and_the_address_of_the_page(module_site: Site) -> None:
+def test_status_reports_the_runtime_and_the_address_of_the_page(module_site: Site) -> None:
     code, printed = module_site.do("status")
     assert code == 0, printed
-    where, bound, page, header, *_ = printed.splitlines()
-    expected = "rclpy of ROS 2's wheels on Cyclone DDS" if os.environ.get("RUNTIME") else "rclpy of "
-    assert where.startswith(expected)
+    where, bound, page, engines, hand, header, *_ = printed.splitlines()
+    assert where.startswith("rclpy of ")
+    assert (" on Cyclone DDS" in where) == bool(os.environ.get("RUNTIME"))
     assert f"ROS domain {module_site.domain}" in where
-    assert bound == "Engines stop within 10.5 s (10.45 s if one process dies, 10.05 s if none does)"
+    assert bound == "Let go: engines off within 10.05 s, or 10.5 s if programs crash"
     assert page == System(module_site.run).page
     assert page.startswith("The page: http://127.0.0.1:")
+    assert re.fullmatch(r"Engines (on|off), (not )?turned o(n|ff) .*, \d+ s ago", engines)
+    assert re.fullmatch("Released|Held by dead_mans_switch", hand)
     assert header.startswith("SERVICE")
 
 
@@ -75,16 +81,14 @@ def test_status_shows_every_service_running(module_site: Site) -> None:
 def test_status_works_from_a_shell_of_the_other_runtime(
     module_site: Site, monkeypatch: pytest.MonkeyPatch, wrapped: bool
 ) -> None:
-    if sourced_rclpy():
-        pytest.skip("platform: a sourced ROS 2 leaves no choice")
     monkeypatch.setenv("RUNTIME", "" if os.environ.get("RUNTIME") else "cyclonedds")
     for name in ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"):  # as in a new shell
         monkeypatch.delenv(name, raising=False)
     python = str(ROOT / "deploy/commands/venv.sh") if wrapped else sys.executable
-    code, printed = module_site.do_command(python, "-m", "deploy.commands.launcher", "status")
-    assert code == 0, printed
-    assert {row[0] for row in rows(printed).values()} == {"RUNNING"}
-    assert "no report" not in printed
+    command = python, "-m", "deploy.commands.launcher", "status"
+    services = status(module_site, lambda row: row[-1] != "no report", *command)
+    assert {row[0] for row in services.values()} == {"RUNNING"}
+    assert "no report" not in {row[-1] for row in services.values()}
 
 
 def test_a_second_start_reports_the_running_system(module_site: Site) -> None:
@@ -163,7 +167,7 @@ def test_a_second_instance_of_a_service_refuses_to_start(module_site: Site) -> N
         env=module_site.environment,
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=150,
     )
     assert second.returncode == 1
     assert second.stderr.count("\n") == 1
@@ -235,13 +239,12 @@ def test_the_operator_commands_switch_and_engines_from_the_terminal(
 ) -> None:
     begin = module_site.begin_in_terminal if in_terminal else module_site.begin_command
     terminal = begin(sys.executable, "-m", "deploy.commands.launcher", "terminal")
-    terminal.await_line("Engines stop within 10.5 s")
-    terminal.await_line("Engines are off")
-    terminal.await_line("Engines were off before this terminal began; ")
+    terminal.await_line("Let go: engines off within 10.05 s")
+    terminal.await_line("Engines are off, ")
     terminal.insist("press\n", "Operator is alive")
     terminal.insist("turn_on\n", "Engines are on")
     terminal.type("turn_off\n")
-    terminal.await_line("Turning off engines, as you asked...")
+    terminal.await_line(r"Turning off engines, as terminal_\d+ asked\.\.\.")
     terminal.type("release\nfly\n")
     terminal.await_line(r"fly\? Commands: press, release, turn_on, turn_off, quit")
     terminal.await_line("Not received signal from operator")
@@ -297,12 +300,16 @@ def test_another_terminal_may_have_sourced_another_rclpy(
     (tmp_path / "rclpy").mkdir()
     (tmp_path / "rclpy" / "__init__.py").write_text("raise ImportError('made for another Python')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    services = status(module_site, until=lambda row: row[-1] == "ok")
-    assert {row[-1] for row in services.values()} == {"ok"}
+    services = status(module_site, until=lambda row: row[-1] != "no report")
+    assert "no report" not in {row[-1] for row in services.values()}
 
 
-def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, tmp_path: Path) -> None:
+@pytest.mark.alone  # the traffic of many tests is a flood
+def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(
+    module_site: Site, peer: Peer, tmp_path: Path
+) -> None:
     first = module_site.members
+    health = peer.collect(topics.DIAGNOSTICS)
     parameters = tmp_path / "mine.yaml"
     parameters.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
     with closing(Site(tmp_path / "run", module_site.domain, "/second")) as second:
@@ -310,10 +317,20 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
         command.await_line(f"ROS domain {second.domain}, namespace /second ...")
         command.await_line("Position x")
         command.await_line("Operator is alive")
+        nodes = {f"/second/{program}" for program in second.programs}
+
+        def all_are_well() -> bool:
+            levels = {it.name: it.level for report in health for it in report.status if it.name in nodes}
+            return levels == dict.fromkeys(nodes, DiagnosticStatus.OK)
+
+        # The discovery of a second arm is a flood for seconds, and `make status` adds 30,000 datagrams.
+        # On Cyclone DDS, nobody else meets an arm in a namespace.
+        if not os.environ.get("RUNTIME"):
+            peer.spin_until(all_are_well)
         second.namespace = ""  # as in another terminal
-        services = status(second, until=lambda row: row[-1] == "ok")
+        services = status(second, until=lambda row: row[-1] != "no report")
         assert services.keys() == second.programs
-        assert {row[-1] for row in services.values()} == {"ok"}
+        assert "no report" not in {row[-1] for row in services.values()}
         fleet = second.begin_command(
             "env", "RUNTIME=cyclonedds", second.python, "-m", "deploy.commands.fleet"
         )

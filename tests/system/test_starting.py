@@ -1,4 +1,4 @@
-"""The start of a system: what it waits for, what it reads, and what it tells of a service that fails."""
+"""The start of a system: what it waits for, what it reads, and what it reports of a service that fails."""
 
 from __future__ import annotations
 

@@ -119,8 +119,8 @@ def test_make_stop_elsewhere_ends_terminal_and_logs(small_site: Site) -> None:
     terminal = small_site.begin("run", STEADY)
     terminal.await_line("Engines are off")
     logs = small_site.begin("logs")
-    logs.await_line("logs/engine_controller.log")
-    logs.await_line(r"-{20} \d{4}-\d\d-\d\d \d\d:\d\d:\d\d -{20}")  # between the runs
+    logs.await_line("^engine_controller +of the last run$")
+    logs.await_line(r"^engine_controller +-{20} \d{4}-\d\d-\d\d \d\d:\d\d:\d\d -{20}")  # between the runs
     assert small_site.do("stop")[0] == 0
     for command in (terminal, logs):
         command.await_line("The system has ended")

@@ -7,6 +7,7 @@ import signal
 from contextlib import closing
 from pathlib import Path
 
+from deploy.supervision.run_directory import SETTINGS
 from tests.system.sites import Checkout, Site, make_small_arm
 
 CONF = ("-c", "deploy/supervisord.conf")
@@ -43,7 +44,7 @@ def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None
     code, table = checkout.do("status")
     assert code == 0
     lines = len(table.splitlines())
-    assert lines == 3 + len(checkout.programs)  # the system, its bounds, and titles
+    assert lines == 5 + len(checkout.programs)  # the system, its bounds, engines, hand, and titles
     code, printed = checkout.do_command("supervisord", *CONF)
     assert code == 1
     assert printed.startswith("Already running: supervisord has pid ")
@@ -85,6 +86,7 @@ def test_make_stop_needs_neither_venv_nor_run_directory(tmp_path: Path, domain_i
         code, printed = checkout.do("start", "demo")
         assert code == 0, printed
         shutil.rmtree(checkout.directory / ".venv")  # as `git clean -xfd` does
+        shutil.rmtree((checkout.run / SETTINGS).resolve())  # in memory
         shutil.rmtree(checkout.run)
         code, printed = checkout.do_command("make", "status")
         assert code != 0

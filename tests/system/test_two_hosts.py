@@ -1,6 +1,6 @@
 """An arm on two hosts: network namespaces with host names of their own, and a line between them.
 
-Its processes have keys on an installed ROS 2, and on Cyclone DDS if that has security.
+Its processes have keys on an installed ROS 2, and on Cyclone DDS if its library has security.
 """
 
 from __future__ import annotations
@@ -21,12 +21,15 @@ import pytest
 
 from deploy.supervision import manifest
 from deploy.supervision.environment import set_middleware
+from deploy.supervision.processes import ROOT
 from deploy.supervision.rclpy_choice import sourced_rclpy
 from deploy.supervision.reaction import reaction
 from tests.chaos import clock
 from tests.chaos.faults import INJECTED
 from tests.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
-from tests.system.sites import LIMIT, ROOT, Command, Site
+from tests.system.sites import LIMIT, Command, Site
+
+pytestmark = pytest.mark.timed  # a busy terminal shows what happens seconds late
 
 TABLET = "tablet"
 SECURITY = Path(f"/usr/lib/{platform.machine()}-linux-gnu/libddsc.so.0debian")
@@ -72,7 +75,7 @@ class Host:
 
     def begin(self, *arguments: str, **environment: str) -> Command:
         """Begin a command of `make` on this host."""
-        return self.begin_command(*self.site._command(arguments), **environment)
+        return self.begin_command(*self.site.command(arguments), **environment)
 
     def begin_command(self, *command: str, **environment: str) -> Command:
         within = [*self._within, "unshare", "--uts", "sh", "-c", AS_HOST, f"{self.name}-host"]
@@ -94,7 +97,7 @@ class Host:
 
     def die(self) -> None:
         """Kill all processes of the arm on this host."""
-        self.site._commands.close()
+        self.site.commands.close()
         while members := self.site.members:
             for pid in members.values():
                 os.kill(pid, signal.SIGKILL)
@@ -183,7 +186,7 @@ def test_each_host_runs_its_programs_and_a_sentinel(arm: Arm) -> None:
     assert {"", *ours, "sentinel_robot"} == arm.robot.site.members.keys()
 
 
-def test_second_start_tells_the_difference_of_the_clocks(arm: Arm) -> None:
+def test_second_start_reports_the_difference_of_the_clocks(arm: Arm) -> None:
     shown = arm.terminal.await_line(r"^Clocks: the clock of host robot-host is (\d+) ms \w.* ours$")
     assert int(shown[1]) <= 50
 

@@ -16,7 +16,7 @@ from tests.system.systemd import command_of, environment_of
 
 
 class Systemd:
-    """Starts a unit, and hears what it is told."""
+    """Starts a unit, and hears its notifications."""
 
     def __init__(self, site: Site, unit: str, address: Path) -> None:
         self._site = site
@@ -34,7 +34,7 @@ class Systemd:
         )
 
     def await_word(self, word: str) -> None:
-        """Wait until the unit tells this, from now on."""
+        """Wait until the unit notifies this, from now on."""
         self._socket.setblocking(False)
         try:
             while True:
