@@ -5,10 +5,9 @@ SCENARIO ?= demo
 PARAMETERS ?=
 MANIFEST ?=
 WEB ?=
-# The page has a run of its own. Only CI attacks an arm with keys and one fail-safe at a time, breaks the line between
-# two hosts, and compares costs.
-LEFT_OUT := tests/operator/page tests/security/attacks tests/simulation/test_attacks.py tests/system/test_two_hosts.py tests/benchmarks/test_ratios.py
-TESTS ?= tests interfaces/reactive_node $(LEFT_OUT:%=--ignore=%)
+# A minute: what starts no process, an arm that starts and stops, and a minute of chaos in virtual time (tests/README.md).
+TESTS ?= tests/component tests/promises tests/operator tests/supervision tests/commands tests/chaos tests/security tests/mutants --ignore=tests/commands/test_fleet.py --ignore=tests/security/attacks \
+    tests/simulation/test_minute.py tests/system/test_start_kill_stop.py -m "not arm or minute" --untimed
 ALL_TESTS := tests interfaces/reactive_node deploy/ground deploy/tools
 MINUTES ?= 5
 SEED ?=
@@ -91,8 +90,7 @@ help:
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
 	@echo "make replay   feed a record through these services and show what differs  (RECORD= REPLAY=--help for more)"
-	@echo "make test     test the arm                        (TESTS=tests/component for a part, TESTS=deploy/ground"
-	@echo "                                                  for the grounds of rclpy, TESTS=tests/operator/page for its page)"
+	@echo "make test     test the arm for a minute           (TESTS=tests/component for all tests of a part)"
 	@echo "make test-all run all tests, for many minutes"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
