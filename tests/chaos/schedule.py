@@ -47,7 +47,11 @@ def random_faults(
     kinds: Iterable[str] = tuple(FAULT_KINDS),
     table: Mapping[str, Any] = FAULT_KINDS,
 ) -> Schedule:
-    """Return a random fault of a table of kinds in each interval of ``every`` [s], the same for a seed."""
+    """Return a random fault of a table of kinds in each interval of ``every`` [s], the same for a seed.
+
+    The simulation kit draws its faults during a run, from what lives then; these are drawn before it, because
+    attacks replace some, and a real arm gets them too, in whose interpreter the kit cannot be imported.
+    """
     rng = random.Random(seed)
     kinds = [kind for kind in sorted(kinds) for _ in range(WEIGHTS.get(kind, 1))]
     planned = []
