@@ -12,9 +12,11 @@ import pytest
 import rclpy
 from mcap_files import McapFile
 from std_msgs.msg import Int64
+from std_srvs.srv import Trigger
 
 from rclpy_simulation import Fault, Simulation
 from rclpy_simulation.faults import KINDS, LOSS, minimal
+from rclpy_simulation.timeline import Timeline
 
 
 def talker() -> None:
@@ -52,8 +54,42 @@ def test_only_the_targets_that_are_named_are_hit(simulation: Simulation) -> None
     simulation.inflict({"kill second": 10.0})
     simulation.run(120.0)
     assert {fault.target for fault in simulation.faults} == {"second"}
-    with pytest.raises(ValueError, match="no fault is called 'explode'"):
-        simulation.inflict({"explode": 1.0})
+
+
+def test_a_drawn_cut_names_its_hosts_in_any_order(simulation: Simulation) -> None:
+    simulation.start(talker, host="robot")
+    simulation.start(talker, host="desk", name="second")
+    simulation.inflict({"cut robot desk": 10.0})
+    simulation.run(60.0)
+    assert {fault.target for fault in simulation.faults} == {"desk robot"}
+
+
+@pytest.mark.parametrize(
+    ("what", "reason"),
+    [
+        ("explode", "no fault is called 'explode'"),
+        ("delay numbers", "begins with /"),
+        ("cut robot", "between two hosts"),
+    ],
+)
+def test_a_fault_that_can_hit_nothing_is_refused(simulation: Simulation, what: str, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        simulation.inflict({what: 1.0})
+    kind, _, target = what.partition(" ")
+    with pytest.raises(ValueError, match=reason):
+        simulation.inflict([Fault(1.0, kind, target, 1.0)])
+
+
+def test_faults_for_a_program_that_never_was_are_an_error_at_the_end() -> None:
+    def run(rates: dict[str, float]) -> None:
+        with Simulation() as simulation:
+            simulation.inflict(rates)
+            simulation.start(talker)
+            simulation.run(1.0)
+
+    run({"kill talker": 1.0})
+    with pytest.raises(ValueError, match=r"no program was called taker, .* they were called talker"):
+        run({"kill taker": 1.0})
 
 
 def test_faults_do_what_they_are_called(simulation: Simulation) -> None:
@@ -79,6 +115,42 @@ def test_faults_do_what_they_are_called(simulation: Simulation) -> None:
     assert not [time for time in sent if 2.0 < time < 3.0 or 6.01 < time < 7.0]
     assert [time for time in sent if 4.0 < time < 5.0]
     assert [fault.target for fault in simulation.faults] == ["talker", "talker", "", ""]
+
+
+def serve() -> None:
+    rclpy.init()
+    node = rclpy.create_node("server")
+    node.create_service(Trigger, "work", lambda _, response: response)
+    rclpy.spin(node)
+
+
+def ask_and_chat() -> None:
+    rclpy.init()
+    node = rclpy.create_node("client")
+    client = node.create_client(Trigger, "work")
+    client.wait_for_service()
+    rclpy.spin_until_future_complete(node, client.call_async(Trigger.Request()))
+    node.create_timer(0.1, lambda: print("still", node.get_clock().now().seconds_nanoseconds()[0]))
+    rclpy.spin(node)
+
+
+def test_a_timeline_has_faults_calls_and_the_last_words_of_a_program_that_prints_much() -> None:
+    with Simulation(epoch=0) as simulation:
+        timeline = Timeline(simulation)
+        simulation.start(serve)
+        simulation.start(ask_and_chat)
+        simulation.inflict([Fault(20.0, "stop", "serve", 1.0)])
+        simulation.run(40.0)
+    text = re.sub(r" +", " ", re.sub(r"\d+\.\d{3}", "T", timeline.text))
+    assert text.splitlines() == [
+        " T serve starts: pid 1000",
+        " T ask_and_chat starts: pid 1001",
+        " T ask_and_chat calls /work",
+        " T serve answers /work",
+        " T – T ask_and_chat prints × 194: still 19",
+        " T stop serve for 1.0 s",
+        " T – T ask_and_chat prints × 200: still 39",
+    ]
 
 
 def test_the_smallest_part_that_fails_is_found() -> None:

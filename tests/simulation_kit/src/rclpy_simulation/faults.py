@@ -33,9 +33,16 @@ class Fault:
         return f"{' '.join(filter(None, (self.kind, self.target)))} for {self.length} s"
 
 
-def _check(kind: str) -> None:
+def _kind_and_target(what: str) -> tuple[str, str]:
+    """Split what a fault is called. Raises ValueError if it cannot hit anything."""
+    kind, _, target = what.partition(" ")
     if kind not in KINDS:
         raise ValueError(f"no fault is called {kind!r}; they are {', '.join(KINDS)}")
+    if kind == "delay" and target and not target.startswith("/"):
+        raise ValueError(f"{what!r}: the full name of a topic begins with /")
+    if kind == "cut" and len(target.split()) == 1:
+        raise ValueError(f"{what!r}: a cut is between two hosts")
+    return kind, " ".join(sorted(target.split())) if kind == "cut" else target
 
 
 class Faults:
@@ -45,13 +52,16 @@ class Faults:
         """:param simulation: a :class:`Simulation`, which this module cannot import."""
         self.inflicted: list[Fault] = []
         """Those that have begun."""
+        self.programs: set[str] = set()
+        """The names of all programs that were started."""
+        self._drawn_for: set[str] = set()  # programs
         self._simulation = simulation
         self._losses = 0
 
     def inflict(self, faults: Iterable[Fault]) -> None:
         """Let faults happen at their times. One whose target does not live then is left out."""
         for fault in faults:
-            _check(fault.kind)
+            _kind_and_target(f"{fault.kind} {fault.target}".strip())
             self._simulation.at(fault.at, lambda it=fault: self._begin(it))  # type: ignore[misc]
 
     def draw(self, rates: Mapping[str, float]) -> None:
@@ -60,19 +70,29 @@ class Faults:
         :param rates: how many in a minute, by kind, or by kind and target: ``kill`` or ``kill talker``.
         """
         for what, rate in rates.items():
-            _check(what.partition(" ")[0])
+            kind, target = _kind_and_target(what)
+            if target and kind in ("kill", "stop"):
+                self._drawn_for.add(target)
             if rate > 0.0:
-                self._draw_next(what, rate, Random(f"{self._simulation.seed} {what}"))
+                self._draw_next(kind, target, rate, Random(f"{self._simulation.seed} {what}"))
 
-    def _draw_next(self, what: str, rate: float, random: Random) -> None:
-        kind, _, target = what.partition(" ")
+    def check(self) -> None:
+        """Raise ValueError if faults were drawn for a program that was never started: a wrong name."""
+        unknown = self._drawn_for - self.programs
+        if unknown and self.programs:
+            raise ValueError(
+                f"no program was called {' or '.join(sorted(unknown))}, which faults were to hit;"
+                f" they were called {', '.join(sorted(self.programs))}"
+            )
+
+    def _draw_next(self, kind: str, target: str, rate: float, random: Random) -> None:
         at = round(self._simulation.now + random.expovariate(rate / _MINUTE), 3)
         length, choice = round(random.uniform(_SHORTEST, _LONGEST), 3), random.random()
 
         def begin() -> None:
             if targets := [each for each in self._targets(kind) if not target or each == target]:
                 self._begin(Fault(at, kind, targets[int(choice * len(targets))], length))
-            self._draw_next(what, rate, random)
+            self._draw_next(kind, target, rate, random)
 
         self._simulation.at(at, begin)
 

@@ -17,14 +17,17 @@ class Output(io.TextIOBase):
         self._parts: deque[str] = deque()
         self._length = 0
         self._has_ended = False
+        self._line = ""
         self.listener: Callable[[str], Any] | None = None
-        """Is called with each text."""
+        """Is called with each line that is not empty."""
 
     def write(self, text: str) -> int:
         """Add text, unless the process has ended."""
         if not self._has_ended:
             if self.listener is not None:
-                self.listener(text)
+                *lines, self._line = (self._line + text).split("\n")
+                for line in filter(str.strip, lines):
+                    self.listener(line)
             self._parts.append(text[-_KEPT:])
             self._length += len(self._parts[-1])
             while self._length > _KEPT and len(self._parts) > 1:
@@ -32,6 +35,8 @@ class Output(io.TextIOBase):
         return len(text)
 
     def end(self) -> None:
+        if self.listener is not None and self._line.strip():
+            self.listener(self._line)
         self._has_ended = True
 
     @property

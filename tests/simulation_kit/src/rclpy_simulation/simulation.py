@@ -96,8 +96,8 @@ class Simulation:
         self._code: dict[str, tuple[CodeType, ModuleSpec]] = {}
         self._stack = ExitStack()
         self._faults = Faults(self)
-        self.notes: list[Callable[[str], Any]] = []
-        """Are called when a program starts, prints or ends, and with each fault."""
+        self.notes: list[Callable[[str, str], Any]] = []
+        """Are called when a program starts, prints or ends, and with each fault; and with what is printed."""
 
     def __enter__(self) -> Simulation:
         self._stack.enter_context(patches.installed(self.domains))
@@ -114,6 +114,8 @@ class Simulation:
             process.kill()
         self._kernel.run_until(self._kernel.now)
         self._stack.close()
+        if error is None:
+            self._faults.check()
 
     # Time
 
@@ -127,6 +129,7 @@ class Simulation:
 
     def run_until(self, condition: Callable[[], object], seconds: float = 60.0) -> None:
         """Let time pass until a condition is true. Raises TimeoutError if it is not within ``seconds``."""
+        __tracebackhide__ = True
         if not condition() and not self._kernel.run_until(
             self._kernel.now + int(seconds * SECOND), condition
         ):
@@ -170,7 +173,8 @@ class Simulation:
         :param parent: the pid of the process that starts it.
         :param delay: from the start of the process to the first line of the program: Python starts.
         """
-        title = name or (program if isinstance(program, str) else program.__name__)
+        title = name or getattr(program, "__name__", str(program))
+        self._faults.programs.add(title)
         main = ModuleType(_MAIN)
         run = self._module(program, main) if isinstance(program, str) else program
         variables = _Environment(self._installation | dict(environment or {}))
@@ -190,14 +194,10 @@ class Simulation:
         )
         if self.notes:
             self.note(f"{title} starts: pid {process.pid}")
-            process.output.listener = partial(self._note_output, title)
+            process.output.listener = partial(self.note, f"{title} prints")
             process.at_end(lambda: self.note(f"{title} has ended: exit code {process.exit_code}"))
         self._kernel.after(delay.draw(self._kernel), process.begin)
         return process
-
-    def _note_output(self, title: str, text: str) -> None:
-        if text.strip():
-            self.note(f"{title} prints: {text.strip().splitlines()[-1]}")
 
     def _module(self, name: str, main: ModuleType) -> Callable[[], None]:
         if name not in self._code:
@@ -249,10 +249,10 @@ class Simulation:
         """Those that have begun."""
         return list(self._faults.inflicted)
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, output: str = "") -> None:
         """Report to the :attr:`notes` what happens."""
         for note in self.notes:
-            note(text)
+            note(text, output)
 
     # Network
 

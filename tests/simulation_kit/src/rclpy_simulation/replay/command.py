@@ -208,14 +208,7 @@ def _options(given: argparse.Namespace, bag: Bag) -> Options:
 
 
 def _shown(stream: TextIO) -> Callable[[str, str], None]:
-    unfinished = set()
-
-    def show(name: str, text: str) -> None:
-        for line in text.splitlines(keepends=True):
-            stream.write(line if name in unfinished else f"[{name}] {line}")
-            (unfinished.discard if line.endswith("\n") else unfinished.add)(name)
-
-    return show
+    return lambda name, line: print(f"[{name}] {line}", file=stream)
 
 
 def _report(given: argparse.Namespace, bag: Bag, output: Path, outcome: Outcome) -> int:
