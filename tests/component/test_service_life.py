@@ -66,7 +66,8 @@ from interfaces.topics import L1
 
 def wire(node):
     node.publish(L1, node.observe(L1).filter(lambda _: False).default_if_empty(7.0))
-    node.create_timer(0.01, lambda: node.count_subscribers(L1.name) > 1 and print("ready", flush=True))
+    publisher = next(each for each in node.publishers if each.msg_type is L1.type)
+    node.create_timer(0.01, lambda: publisher.get_subscription_count() > 1 and print("ready", flush=True))
 
 service.run("speaking", wire)
 """
@@ -113,8 +114,8 @@ atexit.register(lambda: os.kill(os.getpid(), signal.SIGTERM))
 
 NO_LAST_RESORT = """
 from interfaces.service import process
-from interfaces.topics import L1
-process._SHUTDOWN_TIMEOUT = 3600.0
+from reactive_node import node
+process._SHUTDOWN_TIMEOUT = node._DELIVERY = 3600.0
 """
 
 
@@ -180,10 +181,10 @@ def test_service_publishes_a_last_value_at_a_signal(
 ) -> None:
     heard: list[float] = []
     peer = make_node("peer")
-    peer.create_subscription(L1.type, L1.name, lambda message: heard.append(message.data), L1.qos)
-    process = start("-c", SPEAKING)
+    reader = peer.create_subscription(L1.type, L1.name, lambda message: heard.append(message.data), L1.qos)
+    process = start("-c", NO_LAST_RESORT + SPEAKING)
     assert process.wait_for_line() == "ready"
-    spin_until(lambda: peer.count_publishers(L1.name))  # each knows the other one
+    spin_until(reader.get_publisher_count)  # each is matched with the other one, not only in its graph
 
     assert process.end(by=number) == (0, "")
     spin_until(lambda: heard)
