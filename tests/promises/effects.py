@@ -180,8 +180,8 @@ def _of_silence(history: History) -> Iterator[Effect]:
         waiting = [program for program, needed in names.NEEDED_AT_START.items() if source in needed]
         times = (sample.sent for sample in history.output(source))
         for last, following in names.gaps(times, -math.inf, math.inf):
-            since = _known_until(history, source, last)
-            if following - last > FLOWING and since < following:
+            # Short pauses first: they are many, and the rest takes long.
+            if following - last > FLOWING and (since := _known_until(history, source, last)) < following:
                 yield Effect(waiting, since, following, Reason.WAITING, history)
     sent = sorted(sample.sent for source in SOURCES for sample in history.output(source))
     for last, following in names.gaps(sent, -math.inf, math.inf):
