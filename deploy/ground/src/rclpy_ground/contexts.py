@@ -71,6 +71,7 @@ class Context(Destroyable):
         self._participant: Participant | None = None
         self._nodes = 0
         self._lock = threading.RLock()
+        choice.ground.watch_signals()  # those so far do not concern this context
         process.current.contexts.append(weakref.ref(self))
 
     def get_domain_id(self) -> int:

@@ -147,8 +147,20 @@ print(rclpy.ok(), flush=True)
 """
 
 
-def test_a_handled_signal_does_not_end_the_next_context(domain_id: int) -> None:
-    with running(SPIN_AND_INIT_AGAIN) as process:
+SLOW_READING = """
+import os, threading, time
+read = os.read
+def read_late(*arguments):
+    if threading.current_thread().name == "rclpy-signals":
+        time.sleep(0.3)
+    return read(*arguments)
+os.read = read_late
+"""
+
+
+@pytest.mark.parametrize("before", [pytest.param("", id="plain"), pytest.param(SLOW_READING, id="late")])
+def test_a_handled_signal_does_not_end_the_next_context(before: str, domain_id: int) -> None:
+    with running(before + SPIN_AND_INIT_AGAIN) as process:
         assert process.stdout.readline() == "spinning\n"
         process.send_signal(signal.SIGINT)
         assert process.stdout.readline() == "False\n"

@@ -28,12 +28,16 @@ _HANDLER_TIME = 0.2
 """How long the main thread may take to run the handler [s]."""
 _NEVER = min(sys.maxsize, 2**33)  # s since 1970
 
-_writing = -1
+_reading = _writing = -1
 
 
 def listen() -> None:
-    """Begin to wake the waits, unless the program reads its signals itself. Call it on the main thread."""
-    global _writing
+    """Begin to wake the waits, unless the program reads its signals itself. Call it on the main thread.
+
+    Before a new context, call it again: it forgets the signals so far. Python has run their handlers, and
+    they must not end the new context.
+    """
+    global _reading, _writing
     if threading.current_thread() is not threading.main_thread():
         return
     current = signal.set_wakeup_fd(-1)
@@ -41,10 +45,14 @@ def listen() -> None:
         signal.set_wakeup_fd(current)
         return
     if _writing < 0:
-        reading, _writing = os.pipe()
-        os.set_blocking(_writing, False)
-        sources = (reading, open_watch())
+        _reading, _writing = os.pipe()
+        for fd in (_reading, _writing):
+            os.set_blocking(fd, False)
+        sources = (_reading, open_watch())
         threading.Thread(target=_wake, args=sources, name="rclpy-signals", daemon=True).start()
+    with suppress(BlockingIOError):
+        while os.read(_reading, 64):
+            pass
     signal.set_wakeup_fd(_writing, warn_on_full_buffer=False)
 
 
@@ -68,15 +76,17 @@ def _wake(signals: int, steps: int) -> None:
 def _wake_once(poll: select.poll, signals: int) -> None:
     # A function of its own: its variables must keep no context until the next signal.
     numbers = b""
-    for fd, _ in poll.poll():
-        with suppress(OSError):  # ECANCELED: the time of day was set
+    ready = poll.poll()
+    # Before the signals are read: a context that the program makes after them is none of these.
+    contexts = [each for reference in process.current.contexts if (each := reference()) and each.is_valid]
+    for fd, _ in ready:
+        with suppress(OSError):  # ECANCELED: the time of day was set; EAGAIN: the signals were forgotten
             data = os.read(fd, 64)
             numbers += data if fd == signals else b""
-    contexts = [each for reference in process.current.contexts if (each := reference()) and each.is_valid]
     for context in contexts:
         context.wake()
     if any(signal.getsignal(number) is handle for number in numbers):
         time.sleep(_HANDLER_TIME)
         if process.current.signal_options:
-            for context in contexts:  # no newer ones: the program has made them after the signal
+            for context in contexts:
                 context.invalidate()
