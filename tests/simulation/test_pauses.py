@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
+from geometry_msgs.msg import Twist, Vector3
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 from rclpy_simulation import Network, Process, Simulation
 from std_msgs.msg import Header, String
 
@@ -17,10 +20,10 @@ from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, ON, TURN_ON
 from reactive_node import stamps
 from services.drive import LONGEST_STEP
-from tests.promises.observations import values
+from services.examples.twist_gate import COMMANDS
 from tests.simulation.machine import simulated_services
 
-STEPS, TIMES = 20, 5
+STEPS, TIMES = 40, 3
 """The process pauses at each of so many steps after a message, several times: its timers step as well."""
 ROUNDS = STEPS * TIMES
 MESSAGES, REST = 15, 4.0  # of a round; s of silence after them
@@ -50,7 +53,8 @@ class Pauses:
     def _note(self, writer: Any, sample: Any) -> None:
         now = self._simulation.now
         if writer.topic == self._topics[1]:
-            self.sent += [(now, value) for value in values(self._topic, sample.data, "/")]
+            message = deserialize_message(sample.data, self._topic.type)
+            self.sent.append((now, self._topic.value(message)))
         elif writer.topic == self._topics[0]:
             self._heard += 1
             if self._heard % MESSAGES == 0:
@@ -89,6 +93,19 @@ def be_present() -> None:
         time.sleep(REST)
 
 
+def steer() -> None:
+    rclpy.init()
+    node = rclpy.create_node("controller")
+    states, commands = (publisher_of(node, topic) for topic in (topics.ENGINES_STATE, COMMANDS))
+    for _ in range(ROUNDS):
+        for message in range(MESSAGES + round(REST / 0.1)):
+            time.sleep(0.05)
+            commands.publish(Twist(linear=Vector3(x=1.0)))
+            time.sleep(0.05)
+            if message < MESSAGES:
+                states.publish(String(data=ON))
+
+
 def publisher_of(node: Node, topic: topics.Topic) -> Any:
     return node.create_publisher(topic.type, topic.name, topic.qos)
 
@@ -104,11 +121,11 @@ def test_drive_that_pauses_accepts_no_on_for_longer(simulation: Simulation, tmp_
 
     assert len(pauses.ends) == ROUNDS
     for end in pauses.ends:
-        before = max(driven for at, (driven, _) in pauses.sent if at <= end)
-        (*_, (_, (stood, _))) = [each for each in pauses.sent if each[0] < end + pause]
-        (*_, (_, (last, _))) = pauses.after(end, pause)
-        assert stood - before <= DRIVE_TIMEOUT + 1.0 / RATE
-        assert last - stood <= LONGEST_STEP / RATE + 0.001
+        before = max(driven.seconds for at, driven in pauses.sent if at <= end)
+        (*_, (_, stood)) = [each for each in pauses.sent if each[0] < end + pause]
+        (*_, (_, last)) = pauses.after(end, pause)
+        assert stood.seconds - before <= DRIVE_TIMEOUT + 1.0 / RATE
+        assert last.seconds - stood.seconds <= LONGEST_STEP / RATE + 0.001
 
 
 def test_controller_that_pauses_takes_no_presence_for_younger(simulation: Simulation) -> None:
@@ -124,3 +141,17 @@ def test_controller_that_pauses_takes_no_presence_for_younger(simulation: Simula
     for end in pauses.ends:
         ons = [at - end for at, state in pauses.after(end, 0.0) if state == ON]
         assert timeout - 0.2 < max(ons) < timeout
+
+
+def test_gate_that_pauses_lets_no_command_pass_afterwards(simulation: Simulation) -> None:
+    gate = simulation.start("services.examples.twist_gate")
+    velocities = replace(COMMANDS, name="cmd_vel")
+    pause = 2.0
+    pauses = Pauses(simulation, gate, topics.ENGINES_STATE, velocities, pause)
+    controller = simulation.start(steer, name="controller")
+    simulation.run_until(lambda: controller.ended, 1000.0)
+
+    assert len(pauses.ends) == ROUNDS
+    assert any(velocity.linear.x for _, velocity in pauses.sent)
+    for end in pauses.ends:  # one command may wait with its permission
+        assert not any(velocity.linear.x for _, velocity in pauses.after(end, pause + 0.05))
