@@ -20,7 +20,7 @@ from supervisor import events, loggers
 from supervisor.poller import Poller
 from supervisor.states import ProcessStates
 
-from deploy.supervision import extension
+from deploy.supervision import extension, manifest
 from deploy.supervision.extension import LONGEST_WAIT, ArmInterface, LossyLog, make_interface
 
 LIMIT = 10  # bytes of a log until it is rolled over
@@ -49,19 +49,19 @@ def interface_of(*states: int, poller: Any) -> ArmInterface:
     return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
 
 
-def interface_with(**fields: Any) -> tuple[ArmInterface, SimpleNamespace]:
+def interface_with(name: str = "velocity", **fields: Any) -> tuple[ArmInterface, SimpleNamespace]:
     """Return an interface, and the process of its program."""
-    velocity = SimpleNamespace(
-        config=SimpleNamespace(name="velocity"),
+    process = SimpleNamespace(
+        config=SimpleNamespace(name=name),
         get_state=lambda: ProcessStates.RUNNING,
         pid=1000,
         spawnerr=None,
         backoff=0,
         **fields,
     )
-    group = SimpleNamespace(processes={"velocity": velocity})
-    options = SimpleNamespace(poller=SimpleNamespace(poll=None))
-    return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group})), velocity
+    group = SimpleNamespace(processes={name: process})
+    options = SimpleNamespace(poller=SimpleNamespace(poll=lambda timeout: ([], [])))
+    return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group})), process
 
 
 def test_supervisor_is_the_one_whose_names_are_replaced() -> None:
@@ -157,6 +157,24 @@ def test_reports_how_long_a_program_had_no_process(monkeypatch: pytest.MonkeyPat
     assert notify(100.0, starts) == (0, 0.0)
     assert notify(105.0, exits) == (0, 0.0)
     assert notify(105.2, starts) == (1, 0.2)
+
+
+def test_pause_of_supervisord_is_no_silence_of_the_sentinel(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "callbacks", [])
+    now, killed = [100.0], []
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(os, "kill", lambda *given: killed.append(given))
+    arm, sentinel = interface_with(manifest.sentinel())
+    events.notify(events.ProcessStateStartingEvent(sentinel, ProcessStates.STOPPED))
+
+    def poll(passed: float) -> list[Any]:
+        now[0] += passed
+        arm._poller.poll(1.0)
+        return killed
+
+    arm.watch()
+    assert [len(poll(passed)) for passed in (60.0, 1.0, 1.0, 1.0)] == [0, 0, 0, 0]
+    assert poll(1.0) == [(sentinel.pid, signal.SIGKILL)]
 
 
 @pytest.mark.parametrize("state", [ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING])

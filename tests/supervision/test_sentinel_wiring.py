@@ -36,6 +36,7 @@ class Probe:
     def __init__(self) -> None:
         self.programs = [VELOCITY]
         self.failure = ""
+        self.observations = 0
         self.made = self.began = 0  # [ns]
         self.threads: set[int] = set()
         self.made_of: tuple[Path, int] | None = None
@@ -46,6 +47,7 @@ class Probe:
         self.heard.update(reports)
 
     def observe(self) -> Observation:
+        self.observations += 1
         self.began = self.began or time.time_ns()
         self.threads.add(threading.get_ident())
         if self.failure:
@@ -60,11 +62,13 @@ class Policy:
         self.reasons: dict[str, str] = {"velocity": "no health"}
         self.recent_restarts: dict[str, int] = {"velocity": 3}
         self.actions: list[Action] = []
+        self.decisions = 0
         self.timeouts: Timeouts | None = None
         self.floods: set[str] = set()
         self.hears_itself = True
 
     def decide(self, observation: Observation) -> list[Action]:
+        self.decisions += 1
         self.floods.add(observation.flood)
         actions, self.actions = self.actions, []
         return actions
@@ -193,6 +197,12 @@ def test_uptime_is_no_change(wired: Any, spin_until: SpinUntil, spin_for: SpinFo
         watching.probe.programs = [VELOCITY._replace(uptime=uptime)]
         spin_for(0.06)
     assert len(watching.states()) <= before + 1
+
+
+def test_processes_are_observed_once_at_each_look(wired: Any, spin_until: SpinUntil) -> None:
+    watching = wired()
+    spin_until(lambda: watching.policy.decisions >= 20)  # beyond the first state that is repeated
+    assert watching.probe.observations == watching.policy.decisions
 
 
 @pytest.mark.parametrize("namespace", ["", "/armX"])
