@@ -166,6 +166,16 @@ def test_values_that_contradict_each_other_are_refused(tmp_path: Path, content: 
     assert str(raised.value) == f"{file}: {reason}"
 
 
+def test_value_of_a_service_counts_before_that_of_all_services(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "{operator_watchdog: {ros__parameters: {strikes: 2}}, "
+        "/**: {ros__parameters: {strikes: 1, silence: 2.0}}}"
+    )
+    found = parameter_file.reaction_to(parameter_file.load(str(file), "/"), "/")
+    assert (found.watchdog.strikes, found.watchdog.silence) == (2, 2.0)
+
+
 @pytest.mark.parametrize("content", ["", "# velocity:\n#   ros__parameters: {}\n", "{}"])
 def test_a_file_without_content_changes_nothing(tmp_path: Path, content: str) -> None:
     file = tmp_path / "mine.yaml"
