@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from deploy.supervision import manifest
 from interfaces.service import ServiceNode, clocks
-from interfaces.service.clocks import Clocks
+from interfaces.service.clocks import MOST_HOSTS, Clocks
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinUntil
 from tests import health_reports
@@ -49,6 +49,17 @@ def test_host_that_has_not_reported_for_three_seconds_has_no_clock(monkeypatch: 
     assert found.differences()
     monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 3.1)
     assert found.differences() == {}
+
+
+def test_hosts_that_have_gone_make_room_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = heard(*(report(0.0, f"host{number}") for number in range(MOST_HOSTS) for _ in range(3)))
+    assert len(found.differences()) == MOST_HOSTS
+    now = clocks.time.monotonic()
+    monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 3.1)
+    assert found.differences() == {}
+    for _ in range(3):
+        found.hear(report(9.0))
+    assert found.wrong().keys() == {"desk"}
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 
 import reactivex as rx
 from hypothesis import given
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from interfaces.service import Rejected, host
 from interfaces.sources.driving import followed
 from interfaces.topics import DRIVEN_TIME, DrivenTime
+from tests.users import needs_root
 
 
 def played(*times: tuple[float, str]) -> list[float | str]:
@@ -69,3 +72,13 @@ def test_order_of_times_survives_their_message(seconds: float) -> None:
 def test_identity_of_a_host_stays() -> None:
     assert host.identity() == host.identity()
     assert len(host.identity()) == 16
+
+
+@needs_root
+def test_network_namespace_is_a_host_of_its_own() -> None:
+    code = "from interfaces.service import host; print(host.identity())"
+    here, there = (
+        subprocess.run([*within, sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        for within in ([], ["unshare", "--net"])
+    )
+    assert here.stdout == f"{host.identity()}\n" != there.stdout

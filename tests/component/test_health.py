@@ -117,6 +117,22 @@ def test_each_second_shows_a_sign_of_life(
     spin_until(lambda: os.getpid() in reader.take())
 
 
+def test_sign_of_life_waits_for_nothing_that_may_wait_for_dds(
+    service: ServiceNode, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(SYSTEM, str(tmp_path))
+    reader = Beats(tmp_path)
+    has_beaten: list[bool] = []
+    # The first question to DDS: who else is on the topics.
+    monkeypatch.setattr(
+        service.peers, "problems", lambda: iter(has_beaten.append(os.getpid() in reader.take()) or ())
+    )
+
+    service.health.on_period()
+
+    assert has_beaten == [True]
+
+
 def test_report_carries_the_time_of_day_in_simulated_time(make_node: MakeNode, spin_until: SpinUntil) -> None:
     heard: list[DiagnosticArray] = []
     make_node("peer").create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, heard.append, DIAGNOSTICS.qos)

@@ -91,6 +91,18 @@ def wire(node):
 service.run("ready", wire)
 """
 
+PUBLISHING = """
+import reactivex as rx
+from reactivex.scheduler import ImmediateScheduler
+from interfaces import service
+from interfaces.topics import L1
+
+def wire(node):
+    value = rx.just(7.0, ImmediateScheduler.singleton())
+    node.publish(L1, value.do_action(lambda _: print("published", flush=True)))
+
+service.run("publishing", wire)
+"""
 
 ENDING = """
 import rclpy
@@ -247,6 +259,13 @@ def test_second_instance_refuses_to_start_and_names_the_first(start: Start, doma
 
     assert code == 1
     assert errors == f"ready: /ready already runs in domain {domain_id}\n"
+
+
+def test_second_instance_refuses_before_its_first_message(start: Start) -> None:
+    assert start("-c", PUBLISHING).wait_for_line() == "published"
+    second = start("-c", PUBLISHING)
+    assert second.end()[0] == 1
+    assert second.output == ""
 
 
 def test_other_namespace_or_name_is_another_instance(start: Start) -> None:
