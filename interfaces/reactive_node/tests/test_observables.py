@@ -324,6 +324,20 @@ def test_disposing_in_callback_stops_messages(
     assert received == ["0"]
 
 
+def test_observer_that_leaves_in_its_callback_hides_no_message_from_others(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    received: list[str] = []
+    leaving: DisposableBase
+    observable = node.create_observable(String, "topic")
+    leaving = observable.subscribe(lambda _: leaving.dispose())
+    observable.subscribe(texts_into(received))
+    talker.say_when_heard("0", "1")
+    spin_until(lambda: received[-1:] == ["1"])
+
+    assert received == ["0", "1"]
+
+
 def test_thousand_disposals_on_other_threads_under_traffic_are_safe(
     node: ReactiveNode, latched_talker: Talker, spin_until: SpinUntil
 ) -> None:
