@@ -13,7 +13,7 @@ from rclpy.parameter import Parameter
 from reactivex.subject import Subject
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Header
+from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces.service import ServiceNode
 from interfaces.topics import (
@@ -21,15 +21,21 @@ from interfaces.topics import (
     EFFECTOR_POSITION,
     EFFECTOR_SPEED,
     EFFECTOR_TWIST,
+    ENGINES,
+    ENGINES_STATE,
     JOINT_STATES,
+    OFF,
+    ON,
+    OPERATOR_HEARTBEAT,
     THETA1,
+    TURN_ON,
     Topic,
 )
 from reactive_node.ros_time import in_ros_time
 from reactive_node.signals import Answer, hold
 from reactive_node.stamps import Timestamp, by_header
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
-from services import kinematics, robot_state, twist, velocity
+from services import engine_controller, kinematics, operator_watchdog, robot_state, twist, velocity
 from services.examples import joint_source
 from services.examples.joint_source import ROBOT_JOINTS
 
@@ -167,6 +173,32 @@ def test_arm_works_at_each_step_of_the_clock(arm: Arm, step: float) -> None:
     arm.set(YEARS)
     arm.play(1.0, step)
     arm.works()
+
+
+def test_engines_follow_the_hand_in_simulated_time(make_node: MakeNode, spin_until: SpinUntil) -> None:
+    wires = {module.__name__.split(".")[-1]: module.wire for module in (engine_controller, operator_watchdog)}
+    arm = Simulator(make_node, spin_until, **wires)
+    heartbeats, commands = (
+        arm.peer.create_publisher(topic.type, topic.name, topic.qos)
+        for topic in (OPERATOR_HEARTBEAT, ENGINES)
+    )
+    arm.hear(ENGINES_STATE)
+    states = arm.heard[ENGINES_STATE.name]
+    for begin in (YEARS, YEARS + 0.1):  # the watchdog listens from the begin of the scenario on
+        arm.set(begin)
+    spin_until(lambda: heartbeats.get_subscription_count() and commands.get_subscription_count())
+
+    def pass_until(state: str, *messages: Any) -> None:
+        """Send messages and let time pass, until the engines have a state."""
+        end = arm.now + 60.0
+        while arm.now < end and String(data=state) not in states[-1:]:
+            for publisher, message in messages:
+                publisher.publish(message)
+            arm.set(arm.now + 0.1)
+        assert states[-1].data == state
+
+    pass_until(ON, (heartbeats, Bool(data=True)), (commands, String(data=TURN_ON)))
+    pass_until(OFF)
 
 
 # The robot's own states
