@@ -9,6 +9,7 @@ the dead man's switch to false, together with ``hand``, its own name. It lets go
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Callable
 
 import reactivex as rx
@@ -50,17 +51,18 @@ class VirtualSwitch:
     """The dead man's switch, which the scenario holds, and whose parameter ``pressed`` all hands set."""
 
     def __init__(self, node: ReactiveNode) -> None:
-        self._name = node.get_name()
+        # Terminals on two hosts may have one name, which ends in a pid: those of containers are often alike.
+        self._hand = f"{node.get_name()} {secrets.token_hex(4)}"
         self._parameters = RemoteParameters(node, VIRTUAL_SWITCH)
 
     def by_others(self, changes: Observable[ParameterChange]) -> Observable[ParameterChange]:
         """Emit what other hands set."""
         of_switch = changes.filter(lambda it: (it.program, it.name) == (VIRTUAL_SWITCH, PRESSED))
-        return of_switch.filter(lambda it: it.together.get(HAND) != self._name)
+        return of_switch.filter(lambda it: it.together.get(HAND) != self._hand)
 
     def take(self) -> Observable[str]:
         """Release the switch by hand, so that it follows no scenario any more; emits why that fails, or "".
 
         Without an answer it ends in a TimeoutError: a dead man's switch that is killed comes back.
         """
-        return self._parameters.set_together({PRESSED: False, HAND: self._name})
+        return self._parameters.set_together({PRESSED: False, HAND: self._hand})

@@ -62,10 +62,10 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> Pages:
 
 def test_press_takes_the_switch_until_it_answers(pages: Pages) -> None:
     ((values, asked),) = requests
-    assert values == {"pressed": False, "hand": "page"}
+    assert values["pressed"] is False
     asked.on_error(TimeoutError())
-    ((values, asked),) = requests
-    assert values == {"pressed": False, "hand": "page"}
+    ((again, asked),) = requests
+    assert again == values
     asked.on_next("")
     asked.on_completed()
     assert requests == []
@@ -82,8 +82,20 @@ def test_another_hand_releases_a_page_and_ends_its_take(pages: Pages, pressed: b
     assert len(requests) == 1
 
 
+def test_hand_of_the_same_name_on_another_host_is_another_hand(pages: Pages) -> None:
+    ((_, asked),) = requests
+    asked.on_next("")
+    asked.on_completed()
+    Pages().events.on_next(Press("b", 100.0))
+    ((values, _),) = requests
+    pages.changes.on_next(ParameterChange(VIRTUAL_SWITCH, "pressed", False, values))
+
+    assert pages.holds[-1] == Hold()
+
+
 def test_what_is_set_by_the_page_or_concerns_no_switch_ends_nothing(pages: Pages) -> None:
-    pages.set_by("page", False)
+    ((values, _),) = requests
+    pages.set_by(values["hand"], False)
     pages.set_by("terminal_7", False, program="kinematics")
     pages.set_by("terminal_7", False, name="rate")
 
