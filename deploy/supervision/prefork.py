@@ -214,7 +214,8 @@ def _run(argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
     os.environ.clear()
     os.environ.update(environment)
     sys.orig_argv, sys.argv = list(argv), list(argv[2:])
-    _forget("deploy")  # supervisord's own part of this checkout, as old as its start
+    for package in ("deploy", "interfaces"):  # supervisord's own part of this checkout, as old as its start
+        _forget(package)
     code = 1
     try:
         if "sitecustomize" in sys.modules:  # Python imports it at each start

@@ -137,11 +137,13 @@ def test_signals_of_a_program_do_not_wake_supervisord(tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("-1\nTrue\n", "")
 
 
-def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "deploy" / "supervision", tmp_path / "deploy" / "supervision")
-    (tmp_path / "deploy" / "__init__.py").touch()
-    edit = "from deploy.supervision import rpc; open('deploy/supervision/rpc.py', 'a').write('EDITED = True')"
-    done = run(tmp_path, f"from deploy.supervision import rpc; print(rpc.EDITED); {FORKED}", more=edit)
+@pytest.mark.parametrize("name", ["deploy.supervision.rpc", "interfaces.plain_text"])
+def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path, name: str) -> None:
+    for package in ("deploy", "interfaces"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=lambda *_: ["reactive_node"])
+    file = f"{name.replace('.', '/')}.py"
+    edit = f"import {name}; open({file!r}, 'a').write('EDITED = True')"
+    done = run(tmp_path, f"import {name}; print({name}.EDITED); {FORKED}", more=edit)
     assert (done.stdout, done.stderr) == ("True\nTrue\n", "")
 
 
