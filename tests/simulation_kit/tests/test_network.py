@@ -176,6 +176,14 @@ def test_a_short_history_drops_lost_samples_for_newer_ones(simulation: Simulatio
     assert listener.received == sorted(set(listener.received))
 
 
+@pytest.mark.parametrize("part", [1.0, 5.0, -0.1])
+def test_a_loss_that_is_no_part_is_refused(part: float) -> None:
+    with pytest.raises(ValueError, match="no part of the packets"):
+        Network(loss=part)
+    with pytest.raises(ValueError, match="no part of the packets"):
+        Network().loss = part
+
+
 @pytest.mark.simulation(seed=1, network=Network(loss=0.5))
 def test_discovery_survives_loss(simulation: Simulation, start: Start) -> None:
     *_, listener, _ = start(10)

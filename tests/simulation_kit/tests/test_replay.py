@@ -416,6 +416,7 @@ def test_a_bag_that_is_damaged_missing_or_of_sqlite_is_one_line(
         ["in.mcap"],
         ["in.mcap", "--run", "x"],
         ["in.mcap", "--run", "x", "--until", "soon"],
+        ["in.mcap", "--run", "x", "--loss", "5"],
         ["in.mcap", "--run", "x", "--kill", "soon", "--compare"],
     ],
 )

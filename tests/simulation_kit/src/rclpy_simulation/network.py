@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 from rclpy_simulation.host import SECOND, Host
 from rclpy_simulation.kernel import Kernel
@@ -65,6 +66,11 @@ class Network:
     """DDS topics whose samples are lost, with the time until when [ns]."""
     cuts: dict[frozenset[str], int] = field(default_factory=dict)
     """Pairs of hosts between which no packet passes, with the time since when [ns]."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name == "loss" and not 0.0 <= value < 1.0:  # with 1, a reliable writer would send again for ever
+            raise ValueError(f"{value} is no part of the packets: from 0 up to, but not including, 1")
+        super().__setattr__(name, value)
 
     def is_cut(self, one: Host, other: Host) -> bool:
         """Return whether a partition separates two hosts."""

@@ -14,7 +14,7 @@ from typing import TextIO
 from mcap_files import UnreadableError
 
 from rclpy_simulation.host import SECOND
-from rclpy_simulation.network import Delay
+from rclpy_simulation.network import Delay, Network
 from rclpy_simulation.replay.bag import Bag
 from rclpy_simulation.replay.comparison import Bounds, compare
 from rclpy_simulation.replay.lives import Run
@@ -137,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
         help="of the programs' environment",
     )
     add("--latency", type=float, metavar="MS", help="of every message, default 0.2")
-    add("--loss", type=float, default=0.0, metavar="PART", help="of messages that get lost, from 0 to 1")
+    add("--loss", type=_part, default=0.0, metavar="PART", help="of messages that get lost, from 0 to 1")
     add("--seed", type=int, default=0, help="of all chance: of the programs, and of losses")
     add("--rosout", action="store_true", help="record /rosout and /parameter_events as well")
     add("--show", action="store_true", help="show what the programs print")
@@ -177,6 +177,13 @@ def _time(text: str) -> int:
         return int(Decimal(text) * SECOND)
     except InvalidOperation:
         raise argparse.ArgumentTypeError(f"{text!r} is no number") from None
+
+
+def _part(text: str) -> float:
+    try:
+        return Network(loss=float(text)).loss
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _variable(text: str) -> tuple[str, str]:
