@@ -66,7 +66,8 @@ def test_the_kit_wins_over_the_ground_of_the_environment() -> None:
 
 def test_an_import_of_rclpy_before_the_kit_is_a_clear_error() -> None:
     assert _error_of("import rclpy, rclpy_simulation") == (
-        "ImportError: rclpy was imported before its ground was chosen: import what chooses it first"
+        "ImportError: rclpy was imported before its ground was chosen:"
+        " import rclpy_simulation or what else chooses it first"
     )
 
 

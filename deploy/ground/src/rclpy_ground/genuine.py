@@ -25,12 +25,18 @@ def _find() -> Path:
         raise ImportError(
             f"rclpy_ground needs ROS 2's own rclpy, Jazzy or Kilted: that in {place} has no {NAME}"
         )
-    raise ImportError("rclpy_ground needs ROS 2's own rclpy: source ROS 2, or pip install ros-jazzy-rclpy")
+    raise ImportError(
+        "rclpy_ground needs ROS 2's own rclpy: source ROS 2, or"
+        ' pip install "ros-jazzy-rclpy[fastrtps]" ros-jazzy-common-interfaces'
+    )
 
 
 def _load(path: Path) -> Any:
     if f"rclpy.{NAME}" in sys.modules:
-        raise ImportError("rclpy was imported before its ground was chosen: import what chooses it first")
+        raise ImportError(
+            "rclpy was imported before its ground was chosen:"
+            " import rclpy_simulation or what else chooses it first"
+        )
     # Behind the last dot of the name stands what the function that makes the module is called after.
     name = f"{__package__}.{NAME}"
     loader = ExtensionFileLoader(name, str(path))
