@@ -4,7 +4,7 @@ import sys
 from importlib.util import find_spec
 
 if find_spec("mcap_files") is None:
-    sys.exit("replay needs ros2-python-tools: pip install 'rclpy-simulation[replay]'")
+    sys.exit("replay needs ros2-python-tools: pip install ./deploy/tools in the checkout of this kit")
 
 from rclpy_simulation.replay.command import main
 
