@@ -14,7 +14,7 @@ from mcap_files import McapFile
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 
-from rclpy_simulation import Fault, Simulation
+from rclpy_simulation import Delay, Fault, Simulation
 from rclpy_simulation.faults import KINDS, LOSS, minimal
 from rclpy_simulation.timeline import Timeline
 
@@ -115,6 +115,15 @@ def test_faults_do_what_they_are_called(simulation: Simulation) -> None:
     assert not [time for time in sent if 2.0 < time < 3.0 or 6.01 < time < 7.0]
     assert [time for time in sent if 4.0 < time < 5.0]
     assert [fault.target for fault in simulation.faults] == ["talker", "talker", "", ""]
+
+
+def test_a_killed_program_starts_again_as_it_was_started(simulation: Simulation) -> None:
+    simulation.start(print, "word", delay=Delay(3.0, 3.0), host="robot")
+    simulation.inflict([Fault(1.0, "kill", "print", 1.0)])
+    simulation.run(4.9)
+    assert [process.host.name for process in simulation.processes] == ["robot"]
+    simulation.run(0.2)
+    assert [end.exit_code for end in simulation.ends] == [-9, 0]
 
 
 def serve() -> None:

@@ -190,7 +190,14 @@ class Simulation:
         ]
         process.saved += [process.face, *(make() for make in self._first)]
         process.start_again = partial(
-            self.start, program, *arguments, host=host, environment=environment, name=name, parent=parent
+            self.start,
+            program,
+            *arguments,
+            host=host,
+            environment=environment,
+            name=name,
+            parent=parent,
+            delay=delay,
         )
         if self.notes:
             self.note(f"{title} starts: pid {process.pid}")
