@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
+import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -17,6 +19,7 @@ Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
 POLL = 0.2  # s between two looks for Ctrl-C
+_PR_SET_PDEATHSIG = 1  # of <sys/prctl.h>
 
 
 def done(
@@ -36,7 +39,7 @@ def done(
     """
     workers = min(len(os.sched_getaffinity(0)), len(pieces))
     context = multiprocessing.get_context(method)
-    with ProcessPoolExecutor(workers, context, begin, arguments) as pool:
+    with ProcessPoolExecutor(workers, context, _begin, (os.getpid(), begin, *arguments)) as pool:
         try:
             futures = deque(pool.submit(work, piece) for piece in pieces)
             while futures:
@@ -49,6 +52,14 @@ def done(
         finally:
             for worker in multiprocessing.active_children():
                 worker.kill()
+
+
+def _begin(parent: int, begin: Callable[..., None], *arguments: Any) -> None:
+    """Begin; from now on, the worker ends with its parent, even if that is killed."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it has ended before
+        os._exit(1)
+    begin(*arguments)
 
 
 def _result(future: Future[Result]) -> Result:
