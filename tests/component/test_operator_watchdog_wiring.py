@@ -6,8 +6,10 @@ from typing import Any
 from unittest import mock
 
 import pytest
+import reactivex as rx
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
+from reactivex import Observable
 from std_msgs.msg import Bool
 
 from interfaces.service import ServiceNode, UserError
@@ -159,6 +161,25 @@ def test_turn_off_does_not_wait_for_the_log(
     wired(silence=0.4, sampling=0.1, strikes=1)
     spin_until(lambda: len(order) >= 3)
     assert order[:3] == [f"operator {MISSED}", TURN_OFF, f"operator {INCAPACITATED}"]
+
+
+def test_all_outputs_come_from_one_count_of_strikes(
+    wired: Any, monkeypatch: pytest.MonkeyPatch, spin_until: SpinUntil
+) -> None:
+    recipe = operator_watchdog.operator_activity
+    begun: list[float] = []
+
+    def counted(*given: Any, **options: Any) -> Observable[Any]:
+        def begin(_: Any) -> Observable[Any]:
+            begun.append(time.monotonic())
+            return recipe(*given, **options)
+
+        return rx.defer(begin)
+
+    monkeypatch.setattr(operator_watchdog, "operator_activity", counted)
+    watchdog = wired(silence=0.1, sampling=0.05)
+    spin_until(lambda: INCAPACITATED in data(watchdog, OPERATOR_ACTIVITY) and data(watchdog, ENGINES))
+    assert len(begun) == 1
 
 
 @pytest.mark.parametrize(("begin", "resumes"), [(-60.0, True), (60.0, False)])
