@@ -105,7 +105,9 @@ def engines_stay_on(history: History, found: Sequence[Effect]) -> Finding:
         else:
             evidence.append(Evidence(off.sent, "engines turned off although the operator was present"))
     states = history.stream(topics.ENGINES_STATE)
-    heartbeats, age = history.signs_of_life(), history.reaction.controller.max_presence_age
+    heartbeats, given = history.signs_of_life(), history.reaction
+    # A switch may beat less often than `turn_on` needs a presence.
+    age = max(given.controller.max_presence_age, 1.0 / given.switch.rate + TRANSPORT)
     for fault in history.faults:
         if fault.kind == "kill" and fault.target != CONTROLLER:
             before = last_sent(states, fault.begin)

@@ -135,6 +135,12 @@ def test_s2_permits_a_stop_a_little_early_if_the_last_presence_came_too_late() -
     assert verdict("S2", faulty(history, InjectedFault("hold", "operator_presence", 19.8, 22.0))) == UNKNOWN
 
 
+def test_s2_counts_kills_while_a_slow_switch_is_held() -> None:
+    history = reporting(slowed(good(), "operator_heartbeat", 1.0), "engine_controller", max_presence_age=0.05)
+    assert CHECKERS["S2"](reporting(history, "dead_mans_switch", rate=20.0)).cases < 4
+    assert CHECKERS["S2"](reporting(history, "dead_mans_switch", rate=1.0)).cases == 4
+
+
 # S3
 
 
