@@ -105,9 +105,7 @@ def engines_stay_on(history: History, found: Sequence[Effect]) -> Finding:
         else:
             evidence.append(Evidence(off.sent, "engines turned off although the operator was present"))
     states = history.stream(topics.ENGINES_STATE)
-    heartbeats, given = history.signs_of_life(), history.reaction
-    # A switch may beat less often than `turn_on` needs a presence.
-    age = max(given.controller.max_presence_age, 1.0 / given.switch.rate + TRANSPORT)
+    heartbeats, age = history.signs_of_life(), _shortest_absence(history)
     for fault in history.faults:
         if fault.kind == "kill" and fault.target != CONTROLLER:
             before = last_sent(states, fault.begin)
@@ -331,9 +329,16 @@ def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
         if seen and seen.sent > begin and arrives and not is_deaf:
             return False
     heartbeats = [s.sent for s in signs]
-    absence = given.controller.max_presence_age
+    absence = _shortest_absence(history)
     silent = any(two - one > absence for one, two in gaps(heartbeats, begin, off.sent))
     return silent or bool(deaf)
+
+
+def _shortest_absence(history: History) -> float:
+    """Return after how long without a heartbeat the operator may be absent [s]."""
+    given = history.reaction
+    # A switch that is held may beat less often than `turn_on` needs a presence.
+    return max(given.controller.max_presence_age, 1.0 / given.switch.rate + TRANSPORT)
 
 
 def _supervisors_beside_another(history: History) -> Iterator[Evidence]:

@@ -141,6 +141,13 @@ def test_s2_counts_kills_while_a_slow_switch_is_held() -> None:
     assert CHECKERS["S2"](reporting(history, "dead_mans_switch", rate=1.0)).cases == 4
 
 
+def test_s2_permits_no_stop_while_a_slow_switch_is_held() -> None:
+    history = reporting(slowed(good(), "operator_heartbeat", 1.0), "engine_controller", max_presence_age=0.05)
+    history = with_value(silent(history, "operator_presence", 20.0, END), "engines/state", OFF, 35.0)
+    assert verdict("S2", reporting(history, "dead_mans_switch", rate=20.0)) != VIOLATED
+    assert verdict("S2", reporting(history, "dead_mans_switch", rate=1.0)) == VIOLATED
+
+
 # S3
 
 
