@@ -79,12 +79,12 @@ def main(arguments: Sequence[str]) -> int:
     experiments = [experiment(f"{given.seed} {n}", 60.0 * given.minutes) for n in range(given.number)]
     bad = 0
     for number, (each, summary) in enumerate(zip(experiments, summaries(experiments), strict=True), start=1):
-        found = [evidence for finding in summary.total() for evidence in finding.evidence]
+        found = [(finding.promise, it) for finding in summary.total() for it in finding.evidence]
         bad += bool(found)
         if found:
             print(
                 f"{each.seed}: {dict(each.parameters)}",
-                *(f"  {it.time:.2f} s: {it.words}" for it in found),
+                *(f"  {promise} {it.time:.2f} s: {it.words}" for promise, it in found),
                 sep="\n",
             )
         print(f"{number} of {given.number}: {bad} with a violation", flush=True)
