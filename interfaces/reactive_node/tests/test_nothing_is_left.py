@@ -198,7 +198,8 @@ def test_nothing_is_left_of(
 
 
 PEER = """
-import sys
+import faulthandler, sys
+faulthandler.dump_traceback_later(120, exit=True)  # the test would wait for a process that hangs
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node

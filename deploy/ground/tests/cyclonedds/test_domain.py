@@ -198,6 +198,8 @@ def test_localhost_meets_static_peers_on_any_interface() -> None:
 
 
 NODE = """
+import faulthandler
+faulthandler.dump_traceback_later(60, exit=True)  # a process that hangs must not hang the test
 import rclpy
 rclpy.init(args=[])
 node = rclpy.create_node("other")
