@@ -241,6 +241,7 @@ class Machine:
         monkeypatch.setattr("time.monotonic", lambda: self.now)
         monkeypatch.setattr("os.getppid", lambda: SUPERVISORD)
         monkeypatch.setattr(processes, "stat_of", lambda pid: self.states.get(pid, []))
+        monkeypatch.setattr(processes, "effort_of", lambda pid, stat: None)  # these pids may be real ones
         monkeypatch.setattr(processes, "of_system", search)
         self.probe = Probe(run, Asked(SUPERVISORD))
 
