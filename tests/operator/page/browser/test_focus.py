@@ -18,6 +18,8 @@ pytestmark = pytest.mark.timed
 
 LONGER = 4.0  # s: a key without repeats is released after 3 s
 UNSEEN = 2.0  # s within which the page notices that a key repeats no more
+UNFOCUSED = "Released: the window lost focus."
+HIDDEN = "Released: the page was hidden."
 KEYS = pytest.mark.parametrize("key", [SPACE, RETURN], ids=["space", "return"])
 
 
@@ -92,7 +94,7 @@ def test_window_that_loses_focus_releases(arm: Arm, hand: HandAtDesktop) -> None
     hold_with_engines_on(arm, hand)
     with hand.desktop.other_window():
         arm.record.silence_after(time.time() + GONE)
-    assert hand.why == "Released: the window lost focus."
+    assert hand.why == UNFOCUSED
 
 
 @undisturbed
@@ -104,7 +106,7 @@ def test_tab_that_gives_way_to_another_releases(arm: Arm, hand: HandAtDesktop) -
     show_again()
     hand.until("document.visibilityState === 'visible'")
     hand.await_drawing()
-    assert hand.why == "Released: the window lost focus."  # the first sign
+    assert hand.why in (UNFOCUSED, HIDDEN)  # the first sign; Chromium gives them in either order
 
 
 @undisturbed
