@@ -83,10 +83,10 @@ class Reaction(NamedTuple):
                 f"max_presence_age must be at most {most:g} s, not {controller.max_presence_age:g}: "
                 "a turn_on after the last strike would turn the engines on without an operator"
             )
-        if controller.max_presence_age < (least := self.longest_unseen(BEAT)):
+        if controller.max_presence_age < (least := self.longest_unseen(beat)):
             raise UserError(
                 f"max_presence_age must be at least {least:g} s, not {controller.max_presence_age:g}: "
-                "an operator who is present is reported only so often (sampling)"
+                "an operator who is present is reported only so often (sampling, dead_mans_switch.rate)"
             )
         if self.longest_restart < RESTART:
             least = watchdog.lifespan + watchdog.sampling + RESTART

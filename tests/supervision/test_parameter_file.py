@@ -144,7 +144,12 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> No
         (
             "engine_controller: {ros__parameters: {max_presence_age: 0.69}}",
             "max_presence_age must be at least 0.7 s, not 0.69: "
-            "an operator who is present is reported only so often (sampling)",
+            "an operator who is present is reported only so often (sampling, dead_mans_switch.rate)",
+        ),
+        (
+            "dead_mans_switch: {ros__parameters: {rate: 2.5}}",
+            "max_presence_age must be at least 1.05 s, not 1: "
+            "an operator who is present is reported only so often (sampling, dead_mans_switch.rate)",
         ),
         (
             "engine_controller: {ros__parameters: {presence_timeout: 2.0}}",

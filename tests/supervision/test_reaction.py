@@ -56,7 +56,7 @@ def test_bounds_follow_from_the_parameters(
         of_watchdog(silence=1.0),
         of_watchdog(sampling=0.05, silence=0.2) | {"engine_controller": {"max_presence_age": 0.2}},
         {"engine_controller": {"max_presence_age": 0.7}},
-        of_watchdog(silence=2.5) | {"dead_mans_switch": {"rate": 1.0}},
+        of_watchdog(sampling=0.4, silence=1.2) | {"dead_mans_switch": {"rate": 2.5}},
     ],
 )
 def test_parameters_that_allow_just_enough_time_are_taken(given: dict[str, dict[str, Any]]) -> None:
