@@ -184,16 +184,27 @@ def rclpy_get_client_names_and_types_by_node(node: Graph, name: str, namespace: 
 
 
 def rclpy_get_publishers_info_by_topic(node: Graph, topic: str, no_mangle: bool) -> list[dict[str, Any]]:
-    return _infos(node.discovery().writers(), _PUBLISHER, topic, no_mangle)
+    writers = node.answer("writers by topic", lambda writers, _: _by_topic(writers))
+    return _infos(writers, _PUBLISHER, topic, no_mangle)
 
 
 def rclpy_get_subscriptions_info_by_topic(node: Graph, topic: str, no_mangle: bool) -> list[dict[str, Any]]:
-    return _infos(node.discovery().readers(), _SUBSCRIPTION, topic, no_mangle)
+    readers = node.answer("readers by topic", lambda _, readers: _by_topic(readers))
+    return _infos(readers, _SUBSCRIPTION, topic, no_mangle)
 
 
-def _infos(endpoints: list[Endpoint], kind: int, topic: str, no_mangle: bool) -> list[dict[str, Any]]:
+def _by_topic(endpoints: list[Endpoint]) -> dict[str, list[Endpoint]]:
+    found: dict[str, list[Endpoint]] = {}
+    for each in endpoints:
+        found.setdefault(each.topic, []).append(each)
+    return found
+
+
+def _infos(
+    endpoints: dict[str, list[Endpoint]], kind: int, topic: str, no_mangle: bool
+) -> list[dict[str, Any]]:
     wanted = topic if no_mangle else f"rt{topic}"
-    return [_info(each, kind, no_mangle) for each in endpoints if each.topic == wanted]
+    return [_info(each, kind, no_mangle) for each in endpoints.get(wanted, ())]
 
 
 def _info(endpoint: Endpoint, kind: int, no_mangle: bool) -> dict[str, Any]:

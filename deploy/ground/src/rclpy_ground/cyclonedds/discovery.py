@@ -41,6 +41,7 @@ class _BuiltinReader:
         self._convert = convert
         self._lock = threading.Lock()
         self._known: dict[int, Any] = {}
+        self._alive: list[Any] | None = None  # what is known, until that changes
         self.handle = checked(blocking.dds_create_reader(participant, topic, None, None), "built-in reader")
         self.news = checked(blocking.dds_create_readcondition(self.handle, _NOT_READ), "read condition")
         self.gone = checked(blocking.dds_create_readcondition(self.handle, _NOT_ALIVE), "read condition")
@@ -60,21 +61,28 @@ class _BuiltinReader:
                     blocking.dds_return_loan(self.handle, samples, count)
 
     def alive(self) -> list[Any]:
-        """Return the existing entities, converted from the C structure, without those converted to None."""
+        """Return the existing entities, converted from the C structure, without those converted to None.
+
+        It is the same list while nothing changes.
+        """
         with self._lock:
             if blocking.dds_triggered(self.news):
+                self._alive = None
                 for structure, info in self._samples("dds_read_mask", _NOT_READ):
                     if info.instance_state != _ALIVE:
                         self._known.pop(info.instance_handle, None)
                     elif info.valid_data and (found := self._convert(structure)) is not None:
                         self._known[info.instance_handle] = found
-            return list(self._known.values())
+            if self._alive is None:
+                self._alive = list(self._known.values())
+            return self._alive
 
     def forget_gone(self) -> None:
         """Remove entities that no longer exist."""
         with self._lock:
             for _, info in self._samples("dds_take_mask", _NOT_ALIVE):
                 self._known.pop(info.instance_handle, None)
+                self._alive = None
 
 
 class Discovery:

@@ -43,6 +43,7 @@ class Participant(entities.Participant):
         self._lock = threading.RLock()
         self._own: dict[NodeName, Entities] = {}
         self._announced: dict[bytes, bytes] = {}  # by the GUID of a participant
+        self._names: dict[bytes, NodeName] | None = None  # of the announced endpoints, until they change
         self._many = _MANY
         self._discovery: DiscoveryWithNodes | None = None
         self._announcements = super().create_writer(TOPIC, TYPE, WRITER_QOS, USER_DATA)
@@ -103,6 +104,7 @@ class Participant(entities.Participant):
 
         with self._lock:
             gids.append(endpoint.gid)
+            self._names = None
         endpoint.closed = forget
         self._announce_soon()
 
@@ -128,15 +130,18 @@ class Participant(entities.Participant):
     def _take(self) -> None:
         while (sample := self._reader.take()) is not None:
             self._announced[sample.data[GID_AT]] = sample.data
+            self._names = None
         if len(self._announced) > self._many:
             present = self.create_discovery().participants()
             self._announced = {gid: data for gid, data in self._announced.items() if gid in present}
             self._many = max(_MANY, 2 * len(self._announced))
 
     def node_names(self) -> dict[bytes, NodeName]:
-        """Return the node of each endpoint, by its GUID."""
+        """Return the node of each endpoint, by its GUID; the same mapping while nothing changes."""
         with self._lock:
             self._take()
+            if self._names is not None:
+                return self._names
             nodes = list(self._own.items())
             for gid, data in list(self._announced.items()):
                 try:
@@ -144,23 +149,35 @@ class Participant(entities.Participant):
                 except ValueError as error:
                     logging.getLogger(__name__).warning("%s: dropped an announcement: %s", TOPIC, error)
                     del self._announced[gid]
-        return {gid: name for name, own in nodes for gids in own for gid in gids}
+            self._names = {gid: name for name, own in nodes for gids in own for gid in gids}
+            return self._names
 
 
 class DiscoveryWithNodes(Discovery):
     def __init__(self, participant: Participant) -> None:
         super().__init__(participant.handle)
         self._participant = participant
+        self._named_writers, self._named_readers = _Named(), _Named()
 
     def writers(self) -> list[Endpoint]:
-        return self._with_nodes(super().writers())
+        return self._named_writers.of(super().writers(), self._participant.node_names())
 
     def readers(self) -> list[Endpoint]:
-        return self._with_nodes(super().readers())
+        return self._named_readers.of(super().readers(), self._participant.node_names())
 
-    def _with_nodes(self, endpoints: list[Endpoint]) -> list[Endpoint]:
-        names = self._participant.node_names()
-        return [replace(each, node=names.get(each.gid)) for each in endpoints]
+
+class _Named:
+    """Endpoints with their nodes: the same list while neither changes, for each service asks every second."""
+
+    def __init__(self) -> None:
+        self._last: tuple[list[Endpoint], dict[bytes, NodeName], list[Endpoint]] = [], {}, []
+
+    def of(self, endpoints: list[Endpoint], names: dict[bytes, NodeName]) -> list[Endpoint]:
+        last = self._last
+        if last[0] is not endpoints or last[1] is not names:
+            named = [replace(each, node=names.get(each.gid)) for each in endpoints]
+            last = self._last = endpoints, names, named
+        return last[2]
 
 
 def _split(user_data: str) -> tuple[NodeName, str]:
