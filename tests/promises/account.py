@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from interfaces import topics
 from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, ON, TURN_OFF
@@ -52,12 +52,14 @@ def account(history: History, promise: str, evidence: Evidence) -> list[str]:
         lines = [
             *_switch(history, beat),
             *_watchdog(history, since, evidence.time),
-            *_controller(history, since),
+            *_controller(history, since, evidence.time),
+            *_ended(history, history.programs, since - BEFORE / 2, evidence.time),
         ]
         return [*lines, *_faults(history, since - BEFORE / 2, evidence.time)]
     program = _subject(history, evidence.text)
     last = _values if program == KINEMATICS else _engines
     lines = [*_heard(history, program, evidence.time), *last(history, evidence.time)]
+    lines += _ended(history, [program], evidence.time - BEFORE, evidence.time)
     return [*lines, *_faults(history, evidence.time - BEFORE, evidence.time)]
 
 
@@ -82,13 +84,19 @@ def _switch(history: History, beat: Sample | None) -> Iterator[str]:
 
 
 def _watchdog(history: History, since: float, due: float) -> Iterator[str]:
-    """Yield when the watchdog counted its strikes, and which one it still needed."""
+    """Yield when the watchdog counted its strikes, and which one it still needed.
+
+    A return of the operator resets no strike, so those before it count.
+    """
     given = history.reaction.watchdog
     starts = [life.began for life in history.lives_of(WATCHDOG) if since < life.began <= due]
     begin = starts[-1] if starts else since
     commands = between(history.stream(topics.ENGINES), since, history.end)
     off = next((each.sent for each in commands if each.value == TURN_OFF), None)
-    activity = between(history.stream(topics.OPERATOR_ACTIVITY), begin, max(due, off or 0.0))
+    life = max((life.began for life in history.lives_of(WATCHDOG) if life.began <= due), default=0.0)
+    activity = between(history.stream(topics.OPERATOR_ACTIVITY), life, max(due, off or 0.0))
+    ends = [n for n, each in enumerate(activity) if each.value == INCAPACITATED and each.sent < since]
+    activity = activity[ends[-1] + 1 :] if ends else activity
     missed = [each.sent for each in activity if each.value == MISSED]
     strikes = [each for each in missed if each <= due]
     who = f"the successor of {WATCHDOG} since {begin:.2f} s" if starts else process(history, WATCHDOG, due)
@@ -107,15 +115,16 @@ def _watchdog(history: History, since: float, due: float) -> Iterator[str]:
     yield f"{who} {saw}counted {len(strikes)} of {given.strikes} strikes until {due:.2f} s{at}; {command}"
 
 
-def _controller(history: History, since: float) -> Iterator[str]:
+def _controller(history: History, since: float, due: float) -> Iterator[str]:
     states = between(history.stream(topics.ENGINES_STATE), since, history.end)
     ons = list(itertools.takewhile(lambda state: state.value == ON, states))
     if not ons:
         yield f"{CONTROLLER} sent no on after that"
         return
     last = ons[-1].sent
-    presence = last_sent(history.stream(topics.OPERATOR_PRESENCE), last)
+    presence = last_sent(history.stream(topics.OPERATOR_PRESENCE), min(last, due))
     seen = f"the last presence had come at {presence.sent:.2f} s" if presence else "no presence had come"
+    seen = f"until {due:.2f} s, {seen}"
     stop = f"the drive stops {1000 * DRIVE_TIMEOUT:.0f} ms later"
     injected = {each.kind for each in history.faults if each.begin <= last < each.end}
     if STUCK_DRIVE in injected:
@@ -145,6 +154,17 @@ def _said(history: History, program: str, time: float) -> str:
     return next((f"; its health said: {each[:WORDS]}" for each in said if each), "")
 
 
+def _ended(history: History, programs: Sequence[str], begin: float, time: float) -> Iterator[str]:
+    """Yield the last line of the last process that ended by itself in a time."""
+    ended = [
+        (life.ended, life)
+        for life in history.lives
+        if life.program in programs and life.words and life.ended and begin <= life.ended <= time
+    ]
+    for when, life in ended[-1:]:
+        yield f"{life.program} ({life.pid}) ended by itself at {when:.2f} s: {life.words[:WORDS]}"
+
+
 def _values(history: History, time: float) -> Iterator[str]:
     """Yield the last position [m] before a time, and the lengths [m] and angles [rad] that it has to fit."""
     on = (topics.EFFECTOR_POSITION, *topics.CONFIGURATION.values())
@@ -154,7 +174,7 @@ def _values(history: History, time: float) -> Iterator[str]:
 
 
 def _engines(history: History, time: float) -> Iterator[str]:
-    """Yield the last message on each topic that moves or stops the engines."""
+    """Yield the last message on each topic that moves or stops the engines, and the cause of the last one."""
     on = (topics.OPERATOR_HEARTBEAT, topics.OPERATOR_PRESENCE, topics.ENGINES, topics.ENGINES_STATE)
     found = ((topic.name, last_sent(history.stream(topic), time)) for topic in on)
     last_messages = [
@@ -163,7 +183,16 @@ def _engines(history: History, time: float) -> Iterator[str]:
         if last
     ]
     if last_messages:
-        yield f"last messages before: {', '.join(last_messages)}"
+        yield f"last messages before: {', '.join(last_messages)}{_cause(history, time)}"
+
+
+def _cause(history: History, time: float) -> str:
+    """Return what the controller gave as the cause of the last state, after it began; empty if nothing."""
+    states = [state for state in history.stream(topics.ENGINES_STATE) if state.sent <= time]
+    same = list(itertools.takewhile(lambda state: state.value == states[-1].value, reversed(states)))
+    begin = same[-1].sent if same else time
+    causes = between(history.stream(topics.ENGINES_CAUSE), begin, begin + REPORT)
+    return f", {causes[0].value}" if causes else ""
 
 
 def _faults(history: History, begin: float, end: float) -> Iterator[str]:

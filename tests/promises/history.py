@@ -109,6 +109,8 @@ class Life(NamedTuple):
     began: float
     ended: float | None
     """``None`` if the process was alive when the record ended."""
+    words: str = ""
+    """The last line that it wrote, if no signal ended it; empty if it is not known."""
 
 
 class InjectedFault(NamedTuple):

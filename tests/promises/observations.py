@@ -17,7 +17,7 @@ from std_msgs.msg import String
 
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import METADATA
-from interfaces import topics
+from interfaces import cause, topics
 from interfaces.service.health import reported_movement, reported_parameters
 from tests.promises import lateness
 from tests.promises.history import (
@@ -34,7 +34,7 @@ from tests.promises.history import (
 from tests.promises.marks import is_babble
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
-_TEXTS = ("namespace", "program", "kind", "target", "detail")  # in an event; all else are numbers
+_TEXTS = ("namespace", "program", "words", "kind", "target", "detail")  # in an event; all else are numbers
 EARLY = 0.001  # s by which a message may seem to be sent after its reception: clocks are read one by one
 
 
@@ -162,6 +162,8 @@ def values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
         return [message.stamp.sec + message.stamp.nanosec / 1e9]
     if topic is topics.DRIVEN_TIME:
         return [topic.value(message)[1:3]]
+    if topic is topics.ENGINES_CAUSE:
+        return [] if cause.problem(message) else [cause.read(message).words]
     if topic is not topics.DIAGNOSTICS:
         return [getattr(message, "data", None)]
     found = []

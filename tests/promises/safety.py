@@ -83,7 +83,8 @@ def engines_off_in_time(history: History, found: Sequence[Effect]) -> Finding:
         # The silence exercises the promise if it lasts until the engines are off.
         cases += late[-1][1] < end and end - begin > given.controller.max_presence_age
         if lasted > allowed:
-            text = f"engines still on {lasted:.2f} s after the operator's last sign of life"
+            text = f"engines still on {allowed:g} s after the operator's last sign of life"
+            text += f", for {lasted:.2f} s in all"
             due = since + allowed
             evidence.append(Evidence(due, text, _kept_on(history, since, due)))
     evidence += _held_without_a_hand(history, found)
@@ -103,7 +104,7 @@ def engines_stay_on(history: History, found: Sequence[Effect]) -> Finding:
         elif not undisturbed(found, ALL, off.sent - BEFORE, off.sent, *MISSED):
             unknown += 1  # the observer may have missed the command
         else:
-            evidence.append(Evidence(off.sent, "engines turned off although the operator was present"))
+            evidence.append(Evidence(off.sent, _not_permitted(history, found, off)))
     states = history.stream(topics.ENGINES_STATE)
     heartbeats, age = history.signs_of_life(), _shortest_absence(history)
     for fault in history.faults:
@@ -277,13 +278,27 @@ def _commanded(history: History, found: Sequence[Effect], off: Sample) -> bool:
 
     The watchdog needs as many strikes for it as that takes; the other publishers of the contract need none.
     """
-    commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
-    just_before = between(commands, off.sent - _transport(found, off.sent), off.sent + SAME)
+    just_before = _commands_before(history, found, off)
     if not all(claims.is_of_watchdog(history, command) for command in just_before):
         return True
     # Counted at the command: a successor of the watchdog begins to count again.
     strikes = (_strikes(history, found, command.sent) for command in just_before)
     return any(number >= history.reaction.watchdog.strikes for number in strikes)
+
+
+def _commands_before(history: History, found: Sequence[Effect], off: Sample) -> Sequence[Sample]:
+    """Return each `turn_off` that may have led to an `off`."""
+    commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
+    return between(commands, off.sent - _transport(found, off.sent), off.sent + SAME)
+
+
+def _not_permitted(history: History, found: Sequence[Effect], off: Sample) -> str:
+    """Return what is wrong with an `off` that nothing permits."""
+    strikes = [_strikes(history, found, command.sent) for command in _commands_before(history, found, off)]
+    if not strikes:
+        return "engines turned off although the operator was present"
+    needed = history.reaction.watchdog.strikes
+    return f"{WATCHDOG} turned the engines off after {max(strikes):g} of {needed} strikes"
 
 
 def _transport(found: Sequence[Effect], time: float) -> float:

@@ -12,6 +12,7 @@ from tests.promises.account import account
 from tests.promises.findings import Evidence
 from tests.promises.history import (
     CONTROLLER,
+    DRIVE,
     FALSE_PRESENCE,
     NO_TARGET,
     STUCK_DRIVE,
@@ -62,7 +63,7 @@ def test_report_on_engines_that_stay_on_says_who_had_to_act() -> None:
         "the successor of operator_watchdog since 12.00 s counted 1 of 3 strikes until 15.45 s, at 15.0 s, "
         "the last one was due at 21.00 s; turn_off came at 21.00 s",
         "engine_controller (12) sent its last on at 20.90 s, the drive kept it (injected); "
-        "the last presence had come at 5.00 s",
+        "until 15.45 s, the last presence had come at 5.00 s",
         "injected: kill of operator_watchdog at 11.50 s, stuck_drive of (no target) at 5.00 s",
     ]
     shown = text([found], STILL_ON).splitlines()
@@ -125,6 +126,36 @@ def test_report_on_another_promise_tells_what_was_said_last() -> None:
 )
 def test_report_tells_of_the_program_that_a_violation_is_about(text: str, program: str) -> None:
     assert account(History(40.0), "L3", Evidence(13.0, text))[0].startswith(f"{program} was heard")
+
+
+def test_report_counts_the_strikes_before_a_return() -> None:
+    activity = [(1.0, MISSED), (2.0, INCAPACITATED), (4.0, MISSED), (5.0, ALIVE), (8.0, MISSED)]
+    seen = {"operator_activity": [Sample(at, at, it) for at, it in activity]}
+    lasting = replace(STILL_ON, lives=LIVES[:3], streams={**STILL_ON.streams, **seen})
+    assert account(lasting, "S1", Evidence(15.45, "engines still on"))[1] == (
+        "operator_watchdog (13) counted 2 of 3 strikes until 15.45 s, at 4.0, 8.0 s, "
+        "the last one was due at 11.00 s; turn_off came at 21.00 s"
+    )
+
+
+def test_report_shows_why_a_process_ended_by_itself() -> None:
+    words = "TypeError: unsupported operand"
+    ended = [Life(WATCHDOG, 13, 0.0, 11.5, words), Life(WATCHDOG, 14, 12.0, 12.5, words), *LIVES[:2]]
+    early = replace(STILL_ON, lives=[*ended, Life(DRIVE, 15, 0.0, 13.1, words), Life(DRIVE, 16, 0.0, 12.0)])
+    for promise, what in (("S1", "engines still on"), ("L1", "operator_watchdog is silent")):
+        lines = account(early, promise, Evidence(13.0, what))
+        assert f"operator_watchdog (14) ended by itself at 12.50 s: {words}" in lines
+        assert len(lines) <= 5
+
+
+def test_report_on_engines_shows_what_the_controller_gave_as_the_cause() -> None:
+    words = "turned off by engine_controller (it stood still for 0.5 s)"
+    causes = {"engines/cause": [(12.9, "?"), (13.1, words), (14.1, "?")]}
+    stopped = history(states=[(12.0, ON), (13.0, OFF), (13.2, OFF), (14.0, ON)], **causes)
+    for time, last in ((13.0, 13.0), (13.5, 13.2)):
+        assert account(stopped, "S2", Evidence(time, "engines turned off"))[1] == (
+            f"last messages before: engines/state off at {last:.2f} s, {words}"
+        )
 
 
 def test_report_on_silence_shows_the_next_message_and_what_the_health_said() -> None:

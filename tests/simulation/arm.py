@@ -113,7 +113,13 @@ class SimulatedArm:
         host = self._control if name == SWITCH else self._robot
         process = self._start(name, host, name=name, parent=parent, **{MARK: str(self._directory)})
         began = self.simulation.now
-        process.at_end(lambda: self._ended.append(Life(name, process.pid, began, self.simulation.now)))
+
+        def note_end() -> None:
+            lines = process.output.text.split("\n") if (process.exit_code or 0) > 0 else []
+            words = next(filter(str.strip, reversed(lines)), "")
+            self._ended.append(Life(name, process.pid, began, self.simulation.now, words))
+
+        process.at_end(note_end)
         return process
 
     def start_elsewhere(self, name: str, host: str) -> Process:

@@ -11,6 +11,7 @@ from interfaces.topics import TURN_ON
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment
 from tests.promises.history import CONTROLLER, DRIVE, KINEMATICS, WATCHDOG
+from tests.promises.text_report import text
 from tests.simulation import people
 from tests.simulation.bugs import Bug, planted
 from tests.simulation.outcome import simulate
@@ -26,6 +27,8 @@ class Case(NamedTuple):
     faults: Sequence[PlannedFault]
     promise: str
     text: str
+    last_line: str = ""
+    """Of the process that ends by itself."""
 
 
 def holds(number: int) -> list[tuple[float, float]]:
@@ -63,6 +66,7 @@ CASES = {
         [],
         "L4",
         " of kinematics ended without a cause",
+        " s: MemoryError",
     ),
     "a restarted reader misses a constant": Case(
         Bug(
@@ -115,5 +119,9 @@ def test_a_bug_that_breaks_a_claim_is_found(case: Case) -> None:
     experiment = Experiment("claim", case.pressed[-1][1] + 2.0, scenario, list(case.faults))
     assert simulate(experiment).violated() == []
     with planted(case.bug):
-        found = {finding.promise: finding.evidence for finding in simulate(experiment).findings}
+        outcome = simulate(experiment)
+    found = {finding.promise: finding.evidence for finding in outcome.findings}
     assert any(case.text in each.text for each in found[case.promise])
+    report = text(outcome.findings, outcome.history)
+    assert ("ended by itself at" in report) is bool(case.last_line)
+    assert case.last_line in report
