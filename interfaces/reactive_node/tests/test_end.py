@@ -3,7 +3,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from reactivex import Observable
 from reactivex.subject import Subject
 from std_msgs.msg import String
@@ -95,6 +97,21 @@ def test_observable_of_ended_node_completes_at_once(node: ReactiveNode, create: 
     node.destroy_node()
 
     assert Watch(observable).ended == ["completed"]
+
+
+def test_node_ends_without_an_error_although_a_signal_ends_its_context(
+    node: ReactiveNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait = Publisher.wait_for_all_acked
+
+    def wait_after_a_signal(publisher: Publisher, timeout: Duration) -> bool:
+        node.context.try_shutdown()
+        return wait(publisher, timeout)
+
+    monkeypatch.setattr(Publisher, "wait_for_all_acked", wait_after_a_signal)
+    watch = Watch(node.create_observable(String, "topic"))
+    node.destroy_node()
+    assert watch.ended == ["completed"]
 
 
 def test_recipe_that_begins_at_the_end_of_the_node_ends_too(node: ReactiveNode) -> None:

@@ -406,5 +406,8 @@ class ReactiveNode(TolerantNode):
         """Wait until the last messages are read: Fast DDS drops those of a writer that has ended."""
         end = time.monotonic() + _DELIVERY
         for publisher in self.publishers:
-            if self.context.ok():
+            try:
                 publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
+            except RuntimeError:  # RCLError; a signal ends the context at any moment
+                if self.context.ok():
+                    raise
