@@ -83,6 +83,8 @@ class Publisher(WithEvents):
         return self._name
 
     def wait_for_all_acked(self, timeout: Any) -> bool:
+        if not self._context.is_valid:
+            raise RCLError("Failed to wait for all acknowledgements: publisher's context is invalid")
         limit = timeout.nanoseconds
         return self.writer.wait_for_acks(limit if limit >= 0 else INFINITY)
 

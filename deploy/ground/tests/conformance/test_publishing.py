@@ -14,6 +14,7 @@ import pytest
 from deploy.ground.tests.nodes import MakeNode, SpinUntil
 from rcl_interfaces.msg import ParameterValue
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -131,6 +132,8 @@ def test_publishing_after_destruction_or_shutdown_is_an_error(make_node: MakeNod
     context.shutdown()
     with pytest.raises(rclpy_implementation.RCLError):
         publisher.publish(Float64())
+    with pytest.raises(rclpy_implementation.RCLError):
+        publisher.wait_for_all_acked(Duration())
 
 
 def test_other_threads_run_while_an_executor_waits(executor: SingleThreadedExecutor) -> None:
