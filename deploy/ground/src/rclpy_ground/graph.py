@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, TypeVar
@@ -57,23 +56,23 @@ class Graph:
             )
         return [each for each in endpoints if _node_of(each) == (name, namespace)]
 
-    def _counts_of_writers(self) -> Counter[str]:
-        return self.answer("writers", lambda writers, _: Counter(each.topic for each in writers))
+    def writers_on(self, dds_name: str) -> list[Endpoint]:
+        return self.answer("writers", lambda writers, _: _by_topic(writers)).get(dds_name, [])
 
-    def _counts_of_readers(self) -> Counter[str]:
-        return self.answer("readers", lambda _, readers: Counter(each.topic for each in readers))
+    def readers_on(self, dds_name: str) -> list[Endpoint]:
+        return self.answer("readers", lambda _, readers: _by_topic(readers)).get(dds_name, [])
 
     def get_count_publishers(self, name: str) -> int:
-        return self._counts_of_writers()[f"rt{name}"]
+        return len(self.writers_on(f"rt{name}"))
 
     def get_count_subscribers(self, name: str) -> int:
-        return self._counts_of_readers()[f"rt{name}"]
+        return len(self.readers_on(f"rt{name}"))
 
     def get_count_clients(self, name: str) -> int:
-        return self._counts_of_writers()[f"rq{name}Request"]
+        return len(self.writers_on(f"rq{name}Request"))
 
     def get_count_services(self, name: str) -> int:
-        return self._counts_of_readers()[f"rq{name}Request"]
+        return len(self.readers_on(f"rq{name}Request"))
 
     def get_node_names_and_namespaces_with_enclaves(self) -> list[tuple[str, str, str]]:
         enclaves = {
@@ -184,13 +183,13 @@ def rclpy_get_client_names_and_types_by_node(node: Graph, name: str, namespace: 
 
 
 def rclpy_get_publishers_info_by_topic(node: Graph, topic: str, no_mangle: bool) -> list[dict[str, Any]]:
-    writers = node.answer("writers by topic", lambda writers, _: _by_topic(writers))
-    return _infos(writers, _PUBLISHER, topic, no_mangle)
+    writers = node.writers_on(_dds_name(topic, no_mangle))
+    return [_info(each, _PUBLISHER, no_mangle) for each in writers]
 
 
 def rclpy_get_subscriptions_info_by_topic(node: Graph, topic: str, no_mangle: bool) -> list[dict[str, Any]]:
-    readers = node.answer("readers by topic", lambda _, readers: _by_topic(readers))
-    return _infos(readers, _SUBSCRIPTION, topic, no_mangle)
+    readers = node.readers_on(_dds_name(topic, no_mangle))
+    return [_info(each, _SUBSCRIPTION, no_mangle) for each in readers]
 
 
 def _by_topic(endpoints: list[Endpoint]) -> dict[str, list[Endpoint]]:
@@ -200,11 +199,8 @@ def _by_topic(endpoints: list[Endpoint]) -> dict[str, list[Endpoint]]:
     return found
 
 
-def _infos(
-    endpoints: dict[str, list[Endpoint]], kind: int, topic: str, no_mangle: bool
-) -> list[dict[str, Any]]:
-    wanted = topic if no_mangle else f"rt{topic}"
-    return [_info(each, kind, no_mangle) for each in endpoints.get(wanted, ())]
+def _dds_name(topic: str, no_mangle: bool) -> str:
+    return topic if no_mangle else f"rt{topic}"
 
 
 def _info(endpoint: Endpoint, kind: int, no_mangle: bool) -> dict[str, Any]:
