@@ -89,17 +89,17 @@ def _watchdog(history: History, since: float, due: float) -> Iterator[str]:
     A return of the operator resets no strike, so those before it count.
     """
     given = history.reaction.watchdog
-    starts = [life.began for life in history.lives_of(WATCHDOG) if since < life.began <= due]
-    begin = starts[-1] if starts else since
+    began = max((life.began for life in history.lives_of(WATCHDOG) if life.began <= due), default=0.0)
+    begin, is_successor = max(began, since), began > since
     commands = between(history.stream(topics.ENGINES), since, history.end)
     off = next((each.sent for each in commands if each.value == TURN_OFF), None)
-    life = max((life.began for life in history.lives_of(WATCHDOG) if life.began <= due), default=0.0)
-    activity = between(history.stream(topics.OPERATOR_ACTIVITY), life, max(due, off or 0.0))
+    activity = between(history.stream(topics.OPERATOR_ACTIVITY), began, max(due, off or 0.0))
     ends = [n for n, each in enumerate(activity) if each.value == INCAPACITATED and each.sent < since]
     activity = activity[ends[-1] + 1 :] if ends else activity
     missed = [each.sent for each in activity if each.value == MISSED]
     strikes = [each for each in missed if each <= due]
-    who = f"the successor of {WATCHDOG} since {begin:.2f} s" if starts else process(history, WATCHDOG, due)
+    successor = f"the successor of {WATCHDOG} since {began:.2f} s"
+    who = successor if is_successor else process(history, WATCHDOG, due)
     at = f", at {', '.join(f'{each:.1f}' for each in strikes[-given.strikes :])} s" if strikes else ""
     missing = given.strikes - len(strikes)
     if missing <= 0:

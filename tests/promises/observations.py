@@ -163,7 +163,9 @@ def values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
     if topic is topics.DRIVEN_TIME:
         return [topic.value(message)[1:3]]
     if topic is topics.ENGINES_CAUSE:
-        return [] if cause.problem(message) else [cause.read(message).words]
+        with suppress(ValueError):
+            return [cause.read(message).words]
+        return []
     if topic is not topics.DIAGNOSTICS:
         return [getattr(message, "data", None)]
     found = []

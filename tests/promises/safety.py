@@ -83,10 +83,9 @@ def engines_off_in_time(history: History, found: Sequence[Effect]) -> Finding:
         # The silence exercises the promise if it lasts until the engines are off.
         cases += late[-1][1] < end and end - begin > given.controller.max_presence_age
         if lasted > allowed:
-            text = f"engines still on {allowed:g} s after the operator's last sign of life"
-            text += f", for {lasted:.2f} s in all"
+            times = f"{allowed:g} s after the operator's last sign of life, for {lasted:.2f} s in all"
             due = since + allowed
-            evidence.append(Evidence(due, text, _kept_on(history, since, due)))
+            evidence.append(Evidence(due, f"engines still on {times}", _kept_on(history, since, due)))
     evidence += _held_without_a_hand(history, found)
     evidence += claims.last_strike_stops(history, found)
     measured = f"off within {longest:.2f} s, allowed {given.off_within:g} s"
