@@ -43,19 +43,26 @@ class SettingsFile:
         """Write the file, atomically. Raises UserError if that fails; then the file is as it was."""
         if self._path is None:
             return
-        new = self._path.with_suffix(".new")
+        text = _text(self.values)
         try:
-            folder = self._path.parent.resolve()  # a logout may empty /dev/shm (RemoveIPC of logind.conf(5))
-            folder.mkdir(0o700, exist_ok=True)
-            self._check_owner(folder)
-            new.write_text(ros_yaml.dump(self.values), encoding="utf-8")
-            os.replace(new, self._path)
+            try:
+                self._replace(self._path, text)
+            except FileNotFoundError:  # a logout may empty /dev/shm (RemoveIPC of logind.conf(5))
+                self._path.parent.resolve().mkdir(0o700, exist_ok=True)
+                self._replace(self._path, text)
         except OSError as error:
             raise UserError(f"{self._path}: {error.strerror}") from error
 
+    def _replace(self, path: Path, text: str) -> None:
+        self._check_owner(path.parent)
+        new = path.with_suffix(".new")
+        with open(new, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(new, path)
+
     def _check_owner(self, folder: Path) -> None:
         """Raise UserError for the folder of another user, who could press the switch."""
-        if folder.stat().st_uid != os.geteuid():
+        if os.stat(folder).st_uid != os.geteuid():
             raise UserError(f"{folder}: belongs to another user")
 
     def remove(self) -> None:
@@ -63,3 +70,9 @@ class SettingsFile:
         if self._path is not None:
             with suppress(OSError):
                 self._path.unlink()
+
+
+def _text(values: dict[str, Any]) -> str:
+    if {*map(type, values.values())} == {float}:  # the time of the drive, 25 times a second: a dump takes 0.1 ms
+        return "".join(f"{name}: {value!r}\n" for name, value in values.items())
+    return ros_yaml.dump(values)
