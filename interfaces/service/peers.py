@@ -64,18 +64,19 @@ class Peers:
                 for it in _of_other_types(self._node.publishers_of(name), topic):
                     what = f"{self._shown(it)} publishes {it.type or 'another type'}"
                     yield real_name(self._node, topic), what
+        matched = {it.topic_name: it.get_subscription_count() for it in self._node.publishers}
         for name, topic in self._outputs.items():
-            for it in self._node.subscribers_of(name):
-                if expected := _mismatch(it, topic):
-                    yield real_name(self._node, topic), f"{self._shown(it)} expects {expected}"
-            for rival in self._rivals(name, topic):
+            if self._node.count_subscribers(name) > matched.get(name, 0):  # their details would cost more
+                for it in self._node.subscribers_of(name):
+                    if expected := _mismatch(it, topic):
+                        yield real_name(self._node, topic), f"{self._shown(it)} expects {expected}"
+            for rival in self._rivals(name, topic, int(name in matched)):
                 yield real_name(self._node, topic), f"{rival} publishes it, too"
         yield from self._loops()
         yield from self._services()
 
-    def _rivals(self, name: str, topic: Topic) -> Iterator[str]:
-        """Yield who publishes an output of which the contract knows one publisher."""
-        own = sum(publisher.topic_name == name for publisher in self._node.publishers)
+    def _rivals(self, name: str, topic: Topic, own: int) -> Iterator[str]:
+        """Yield who publishes an output of which the contract knows one publisher; the node has ``own`` ones."""
         is_shared = len(topic.publishers) != 1 or topic.name[0] == "/"
         if is_shared or self._node.count_publishers(name) <= own:
             return
