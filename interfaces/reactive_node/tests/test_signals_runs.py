@@ -114,9 +114,13 @@ def test_integral_forgets_and_is_exact(scheduler: VirtualTime, monkeypatch: pyte
 def test_memory_is_flat(scheduler: VirtualTime, monkeypatch: pytest.MonkeyPatch) -> None:
     sources: list[Any] = []
     take = Source.settle
-    monkeypatch.setattr(
-        Source, "settle", lambda self, now: sources.append(self) if self not in sources else take(self, now)
-    )
+
+    def settle(self: Source, now: int) -> int:
+        if self not in sources:
+            sources.append(self)
+        return take(self, now)
+
+    monkeypatch.setattr(Source, "settle", settle)
     samples = rx.interval(0.02).map(lambda count: stamped(1.0, (count + 1) * 20 * MS))
     signal = linear(samples, lateness=LATENESS, gap=GAP)
     asked = lift(lambda *parts: parts)(

@@ -16,6 +16,7 @@ from reactive_node.signals.source import SECOND, Memory, Source
 _SET = SECOND  # a clock that jumps by more was set
 _FASTEST = 20  # times as fast as the steady clock: a simulation that gains more was set
 _SHORTEST = 1e-6  # s, the resolution of Rx's clocks
+_FEW = 16  # looks whose memory is not worth a clean-up
 
 
 class Node(Protocol):
@@ -58,7 +59,10 @@ class Run:
         self._nodes: dict[Any, Any] = {}
         self._sources: list[Source] = []
         self._memories: list[Memory] = []
+        self._longest_wait = 0
+        """How long it takes at most until a value is known [ns]."""
         self._questions: Questions
+        self._unforgotten = 0  # looks since the last clean-up
         self._timer = SerialDisposable()
         self._armed_for: int | None = None  # [ns]
         self._latest = 0  # the latest time by the clock of the stamps [ns]
@@ -96,6 +100,7 @@ class Run:
     def start(self, questions: Questions) -> abc.DisposableBase:
         """Begin to receive samples and to answer."""
         self._questions = questions
+        self._longest_wait = max((source.wait + source.high for source in self._sources), default=0)
         subscriptions = [
             source.samples.subscribe(
                 source.receive, self.observer.on_error, source.complete, scheduler=self._scheduler
@@ -113,22 +118,22 @@ class Run:
             self.observer.on_error(error)
 
     def _advance(self, now: int) -> None:
-        horizon = now - self._longest_wait() if self._steady else now
+        horizon = now - self._longest_wait if self._steady else now
         for source in self._sources:
-            source.settle(now)
-            horizon = min(horizon, source.horizon() - source.high)
+            known = source.settle(now) - source.high
+            if known < horizon:
+                horizon = known
         self._questions.answer(horizon)
         are_complete = bool(self._sources) and all(source.is_complete for source in self._sources)
         if self._questions.is_done(are_complete):
             self.observer.on_completed()
             return
-        for memory in reversed(self._memories):  # those first that are made from others
-            memory.forget(horizon + memory.low)  # what was asked up to there is answered
+        self._unforgotten += 1
+        if self._unforgotten == _FEW:
+            self._unforgotten = 0
+            for memory in reversed(self._memories):  # those first that are made from others
+                memory.forget(horizon + memory.low)  # what was asked up to there is answered
         self._arm(now)
-
-    def _longest_wait(self) -> int:
-        """Return how long it takes at most until a value is known [ns]."""
-        return max((source.wait + source.high for source in self._sources), default=0)
 
     def _restart(self, now: int) -> None:
         for memory in self._memories:
@@ -141,7 +146,7 @@ class Run:
         asked = self._questions.next()
         if asked is None:
             return
-        due = asked + self._longest_wait()
+        due = asked + self._longest_wait
         if self._armed_for is not None and self._armed_for <= due:
             return  # it looks early, and then is armed again
         self._armed_for = due

@@ -232,15 +232,20 @@ class _Interpolated(_Held):
         else:
             self.refuse(late)
 
-    def settle(self, now: int) -> None:
-        settled = self.settled
-        super().settle(now)
+    def settle(self, now: int) -> int:
+        before, settled = self.settled, super().settle(now)
         if self._late is not None:
-            rest = max([settled, *(last + 2 * self._gap for last in self._times[-1:])])
-            if self.settled >= rest:
+            rest = max([before, *(last + 2 * self._gap for last in self._times[-1:])])
+            if settled >= rest:
                 super().take(rest + 1, self._late.value)
                 self.refuse(self._late._replace(taken=rest + 1))
                 self._late, self._shifted = None, (rest + 1, self._late.is_first)
+        if not self._times:
+            return settled
+        last = self._times[-1]
+        if isinstance(self._silence, Unchanged):
+            return max(last, settled - self._gap)
+        return settled if settled >= last + self._gap else last
 
     def _drop_late(self) -> None:
         """Drop the late value: there is a newer one."""
@@ -255,14 +260,6 @@ class _Interpolated(_Held):
         if not isinstance(self._silence, Unchanged):
             self._times.clear()
             self._values.clear()
-
-    def horizon(self) -> int:
-        if not self._times:
-            return self.settled
-        last = self._times[-1]
-        if isinstance(self._silence, Unchanged):
-            return max(last, self.settled - self._gap)
-        return self.settled if self.settled >= last + self._gap else last
 
     def at(self, time: int) -> tuple[Any, int]:
         times, values = self._times, self._values

@@ -99,14 +99,15 @@ class Source(Memory):
         self.is_complete = True
         self._advance()
 
-    def settle(self, now: int) -> None:
-        """Take the samples before which none can come any more."""
+    def settle(self, now: int) -> int:
+        """Take the samples before which none can come; return the time up to which values are known [ns]."""
         settled = _FAR if self.is_complete else now - self.lateness
         if settled > self.settled:
             self.settled = settled
             while self.waiting and self.waiting[0][0] <= settled:
                 time, _, value = heapq.heappop(self.waiting)
                 self.take(time, value)
+        return self.settled
 
     def refuse(self, sample: Refused) -> None:
         """Report a sample."""
@@ -127,7 +128,3 @@ class Source(Memory):
     def take_late(self, late: Refused) -> None:
         """Report the newest sample of all, which is too late; its value may count from another time on."""
         self.refuse(late)
-
-    def horizon(self) -> int:
-        """Return the time up to which values are known [ns]."""
-        return self.settled
