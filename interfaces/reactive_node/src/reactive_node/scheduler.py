@@ -60,6 +60,8 @@ class NodeScheduler(PeriodicScheduler):
     simulation that stands still.
     """
 
+    is_simulated: bool
+    """Whether ROS time is simulated; otherwise it is the time of day."""
     _before_jump: int  # [ns]
 
     def __init__(self, node: Node, *, steady: bool = False) -> None:
@@ -75,6 +77,7 @@ class NodeScheduler(PeriodicScheduler):
         self._disposed = False
         self._offset = 0  # [ns]: this scheduler's time minus the clock's time
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._note_source()
         self._use_clock(self._time_is_simulated())
         if not self._simulated:
             begin = time.time_ns() if steady else node.get_clock().now().nanoseconds
@@ -92,18 +95,14 @@ class NodeScheduler(PeriodicScheduler):
         return stamps.from_nanoseconds(self._read())
 
     @property
-    def is_simulated(self) -> bool:
-        """Whether ROS time is simulated; otherwise it is the time of day."""
-        clock = self._node.get_clock()
-        return isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
-
-    @property
     def kept(self) -> int:
         """How many actions it keeps: those that wait, and cancelled ones until the next clean-up."""
         return len(self._heap)
 
     def time_of_stamps(self) -> int:
         """Return the ROS time, by which the stamps of headers count [ns]; it may be set."""
+        if self._is_time_of_day:
+            return time.time_ns()  # rclpy's clock takes six calls
         return int(self._node.get_clock().now().nanoseconds)
 
     def schedule(
@@ -230,13 +229,19 @@ class NodeScheduler(PeriodicScheduler):
 
     # The clock
 
+    def _note_source(self) -> None:
+        clock = self._node.get_clock()
+        is_ros_time = isinstance(clock, ROSClock)
+        self.is_simulated = is_ros_time and bool(clock.ros_time_is_active)
+        self._is_time_of_day = is_ros_time and not self.is_simulated
+
     def _use_clock(self, simulated: bool) -> None:
         self._simulated = simulated
         self._clock = self._node.get_clock() if simulated else self._steady
         self._timer: Timer = self._node.create_timer(1.0, self._run, clock=self._clock, autostart=False)
 
     def _read(self) -> int:
-        # In real time, read `time.monotonic_ns` directly; rclpy's clock takes six calls.
+        # In real time, read `time.monotonic_ns` directly, as above.
         now = int(self._clock.now().nanoseconds) if self._simulated else time.monotonic_ns()
         return now + self._offset
 
@@ -248,6 +253,7 @@ class NodeScheduler(PeriodicScheduler):
 
     def _time_has_jumped(self, jump: TimeJump) -> None:
         """Continue this scheduler's time without a jump back, by the same clock or by another one."""
+        self._note_source()
         with self._lock:
             if self._disposed:
                 return
