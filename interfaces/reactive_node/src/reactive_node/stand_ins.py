@@ -215,8 +215,10 @@ class _Event:
             return
         if self._changes is None:
             self._changes = [name for name in dir(status) if name.endswith("_change")]
-        if any(getattr(status, name) for name in self._changes):
-            self._create_task(self._handler.execute(status))
+        for name in self._changes:
+            if getattr(status, name):
+                self._create_task(self._handler.execute(status))
+                return
 
     def add_event(self, event: Any) -> int:
         return 0
