@@ -124,7 +124,8 @@ class EventsExecutor:
     def _spin(self, timeout: float | None, once: bool) -> None:
         if self._spins:
             raise RuntimeError("Attempt to spin an already-spinning Executor")
-        limit = INFINITY if timeout is None else time.monotonic_ns() + math.ceil(timeout * 1e9)
+        now = time.monotonic_ns()
+        limit = INFINITY if timeout is None else now + math.ceil(timeout * 1e9)
         self._spins = True
         ready, wait = self._ready, self._wait_set.wait
         try:
@@ -132,7 +133,7 @@ class EventsExecutor:
                 if self._changed:
                     self._update()
                 if not ready:
-                    left = self._time_left(time.monotonic_ns(), limit)
+                    left = self._time_left(now, limit)
                     tokens = wait(min(left, _BETWEEN_LOOKS) if self._unfinished else left)
                     if not self._handle.is_valid:
                         self._nodes.clear()
@@ -149,13 +150,16 @@ class EventsExecutor:
                     ready.extend(self._unfinished)
                     self._unfinished.clear()
                     if not ready:
-                        if limit != INFINITY and time.monotonic_ns() >= limit and not self._changed:
+                        now = time.monotonic_ns()
+                        if now >= limit and not self._changed:
                             break
                         continue
                 handle, entity = ready.popleft()
                 handle(entity)
                 if once:
                     break
+                if not ready:
+                    now = time.monotonic_ns()
         finally:
             self._spins = self._stopped = False
         if not self._handle.is_valid:
@@ -216,22 +220,20 @@ class EventsExecutor:
             raise error
 
     def _later(self, result: Any) -> None:
-        if result is not None and inspect.iscoroutine(result):
+        """Run what a callback returned, if it was a coroutine."""
+        if inspect.iscoroutine(result):
             self.create_task(result)
 
     def _run_timer(self, timer: Any) -> None:
-        handle = timer.handle
-        if handle.is_timer_ready():
-            handle.call_timer()
-            self._later(timer.callback())
+        if timer.handle.call_if_ready() and (result := timer.callback()) is not None:
+            self._later(result)
 
     def _run_subscription(self, subscription: Any) -> None:
         taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
         if taken is not None:
-            if subscription._callback_type.value == 0:
-                self._later(subscription.callback(taken[0]))
-            else:
-                self._later(subscription.callback(*taken))
+            arguments = taken[:1] if subscription._callback_type.value == 0 else taken
+            if (result := subscription.callback(*arguments)) is not None:
+                self._later(result)
 
     def _run_service(self, service: Any) -> None:
         request, header = service.handle.service_take_request(service.srv_type.Request)

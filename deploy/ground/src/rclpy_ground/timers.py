@@ -62,7 +62,16 @@ class Timer(Destroyable):
     def call_timer(self) -> None:
         if self._is_canceled:
             raise _TimerCanceled("failed to call timer: it is canceled")
-        now = self.clock.nanoseconds()
+        self._call(self.clock.nanoseconds())
+
+    def call_if_ready(self) -> bool:
+        """Note a call of the timer if it is due; return whether it was. It reads the clock once."""
+        if self._is_canceled or (now := self.clock.nanoseconds()) < self._next:
+            return False
+        self._call(now)
+        return True
+
+    def _call(self, now: int) -> None:
         self._expected, self._last = self._next, now
         period = self._period
         self._next += period
