@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, bisect_right
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -185,8 +186,17 @@ class History:
 
     def lives_of(self, program: str) -> list[Life]:
         """Return the processes of a program, without duplicates that ended while an older one lived on."""
-        lives = [life for life in self.lives if life.program == program]
-        return [life for life in lives if not any(_outlives(older, life) for older in lives)]
+        return self._lives.get(program, [])
+
+    @cached_property
+    def _lives(self) -> dict[str, list[Life]]:
+        of_programs: defaultdict[str, list[Life]] = defaultdict(list)
+        for life in self.lives:
+            of_programs[life.program].append(life)
+        return {
+            program: [life for life in lives if not any(_outlives(older, life) for older in lives)]
+            for program, lives in of_programs.items()
+        }
 
     def effect_end(self, fault: InjectedFault) -> float:
         """Return when a fault ended, or earlier, when its target was replaced."""

@@ -21,17 +21,18 @@ class PublishedValues:
 
     def __init__(self, history: History) -> None:
         # A service drops a value with a problem, and keeps the one before it.
-        self._streams = [
+        good = [
             [s for s in history.stream(topic) if not topic.problem(s.value)]
             for topic in topics.CONFIGURATION.values()
         ]
+        self._streams = [([s.sent for s in stream], [s.value for s in stream]) for stream in good]
 
     def explain(self, position: Sample, within: float) -> bool:
         """Return whether a position follows from values that were the latest within ``within`` [s] before."""
         # The newest values nearly always explain it; older ones are tried only if they do not.
         for window in (0.05, 0.3, 2.0, LONGEST_PAUSE):
             candidates = [
-                self._candidates(stream, position.sent, min(window, within)) for stream in self._streams
+                self._candidates(*stream, position.sent, min(window, within)) for stream in self._streams
             ]
             if _any_fits(candidates, *position.value):
                 return True
@@ -40,11 +41,12 @@ class PublishedValues:
         return False
 
     @staticmethod
-    def _candidates(stream: Sequence[Sample], time: float, window: float) -> list[float]:
+    def _candidates(
+        sent: Sequence[float], values: Sequence[float], time: float, window: float
+    ) -> list[float]:
         """Return the values that were the latest at some moment of the window, newest first."""
-        newest = bisect_right(stream, time + 0.005, key=lambda s: s.sent)
-        oldest = bisect_right(stream, time - window, key=lambda s: s.sent)
-        return [s.value for s in reversed(stream[max(0, oldest - 1) : newest])]
+        newest, oldest = bisect_right(sent, time + 0.005), bisect_right(sent, time - window)
+        return [*reversed(values[max(0, oldest - 1) : newest])]
 
 
 def may_lack_values(history: History, found: Sequence[Effect], time: float) -> bool:
