@@ -14,8 +14,7 @@ _QUICK = ("rclpy", "rclpy_ground", "rclpy_simulation", "importlib", "_frozen_imp
 """Packages that never wait while they hold a lock of their own: theirs are real, which is faster."""
 
 
-def _runner() -> Thread | str:
-    return here.thread or "the code that runs the simulation"
+_OUTSIDE = "the code that runs the simulation"
 
 
 class Lock:
@@ -30,7 +29,7 @@ class Lock:
         self._waiters: list[Thread] = []
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        own = _runner()
+        own = here.thread or _OUTSIDE
         if self._owner is not None:
             if self._is_reentrant and self._owner is own:
                 self._count += 1
@@ -64,10 +63,16 @@ class Lock:
         return self._owner is not None
 
     def __enter__(self) -> bool:
+        if self._owner is None:  # nearly always
+            self._owner, self._count = here.thread or _OUTSIDE, 1
+            return True
         return self.acquire()
 
     def __exit__(self, *_: object) -> None:
-        self.release()
+        if self._count == 1 and not self._waiters and self._owner is here.thread:
+            self._owner, self._count = None, 0
+        else:
+            self.release()
 
 
 class RLock(Lock):
@@ -79,7 +84,7 @@ class RLock(Lock):
     # As threading.Condition asks for it.
 
     def _is_owned(self) -> bool:
-        return self._owner is _runner()
+        return self._owner is (here.thread or _OUTSIDE)
 
     def _release_save(self) -> int:
         count, self._count = self._count, 1

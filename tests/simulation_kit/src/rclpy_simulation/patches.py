@@ -191,19 +191,26 @@ def _random_bytes(process: Process, size: int) -> bytes:
     return process.kernel.random.randbytes(size)
 
 
-def _replacements() -> list[tuple[Any, str, Any]]:
-    def monotonic(it: Process) -> float:
-        return it.read_clock() / 1e9
+def _seconds(real: Callable[[], float]) -> Callable[[], float]:
+    """Return a clock of monotonic time [s]."""
 
+    def call() -> float:
+        process = here.process
+        return real() if process is None else process.read_clock() / 1e9
+
+    return call
+
+
+def _replacements() -> list[tuple[Any, str, Any]]:
     def time_of_day(it: Process) -> float:
         return _time_of_day(it) / 1e9
 
     condition, thread = threading.Condition, threading.Thread
     return [
         (time, "monotonic_ns", _clock(Process.read_clock, time.monotonic_ns)),
-        (time, "monotonic", _clock(monotonic, time.monotonic)),
+        (time, "monotonic", _seconds(time.monotonic)),
         (time, "perf_counter_ns", _clock(Process.read_clock, time.perf_counter_ns)),
-        (time, "perf_counter", _clock(monotonic, time.perf_counter)),
+        (time, "perf_counter", _seconds(time.perf_counter)),
         (time, "time_ns", _clock(_time_of_day, time.time_ns)),
         (time, "time", _clock(time_of_day, time.time)),
         (time, "clock_gettime_ns", in_process(_read_clock, time.clock_gettime_ns)),

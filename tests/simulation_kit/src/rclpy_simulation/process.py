@@ -74,6 +74,7 @@ class Process:
     ) -> None:
         self.processes = processes
         self.kernel = kernel = processes.kernel
+        self.listeners = processes.listeners
         self.name = name
         self.host = host
         self.pid = kernel.next_pid()
@@ -163,11 +164,9 @@ class Process:
 
     def is_about_to_run(self) -> bool:
         """Inform the listeners that it is about to run; return whether it may: they can kill or stop it."""
-        if listeners := self.processes.listeners:
-            for listener in listeners:
-                listener(self)
-            return self.exit_code is None and not self.is_suspended
-        return True
+        for listener in self.listeners:
+            listener(self)
+        return self.exit_code is None and not self.is_suspended
 
     def switch(self, thread: Thread, enter: Callable[[], Any]) -> None:
         """Run a thread until it waits or ends."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 from asyncio import events, tasks
 from typing import Any
 
+present = events._get_running_loop
+"""Returns the loop that runs now, or None."""
+
 
 def leave() -> Any:
     """Take the loop and the task that run out of asyncio's variables, which all simulated threads share."""
-    loop = events._get_running_loop()
-    if loop is None:
-        return None
+    loop: Any = present()
     task = tasks.current_task(loop)
     if task is not None:
         tasks._leave_task(loop, task)
@@ -20,8 +21,7 @@ def leave() -> Any:
 
 def enter(left: Any) -> None:
     """Put back what :func:`leave` has returned."""
-    if left is not None:
-        loop, task = left
-        events._set_running_loop(loop)
-        if task is not None:
-            tasks._enter_task(loop, task)
+    loop, task = left
+    events._set_running_loop(loop)
+    if task is not None:
+        tasks._enter_task(loop, task)

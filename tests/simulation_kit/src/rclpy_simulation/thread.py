@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import traceback
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures.thread import _threads_queues
 from pathlib import Path
 from typing import Any, Protocol
@@ -40,12 +40,12 @@ class Owner(Protocol):
     kernel: Kernel
     exit_code: int | None
     interrupts: deque[Callable[[], Any]]
+    listeners: Sequence[Callable[..., Any]]
+    is_stopped: bool
+    is_hung: bool
 
     @property
     def present(self) -> int: ...
-
-    @property
-    def is_suspended(self) -> bool: ...
 
     def postpone(self, action: Callable[[], Any]) -> None: ...
 
@@ -113,12 +113,12 @@ class Thread:
 
     def _resume(self) -> None:
         process = self.process
-        if process.is_suspended:
+        if process.is_stopped or process.is_hung:
             process.postpone(self._resume)
             return
         self._is_due = False
         if self._waits and not self.done and process.exit_code is None:
-            if not process.is_about_to_run():
+            if process.listeners and not process.is_about_to_run():
                 self.wake()
                 return
             self._waits = False
@@ -134,11 +134,14 @@ class Thread:
         if deadline is not None and (self._alarm is None or deadline < self._alarm):
             self._alarm = max(deadline, kernel.now)
             kernel.schedule(self._alarm, self._ring)
-        left = running_loop.leave()
-        try:
+        if running_loop.present() is None:
             kernel.hub.switch()
-        finally:
-            running_loop.enter(left)
+        else:
+            left = running_loop.leave()
+            try:
+                kernel.hub.switch()
+            finally:
+                running_loop.enter(left)
         if process.interrupts or process.exit_code is not None:
             process.handle_interrupts(self)
 
