@@ -76,7 +76,10 @@ class Peers:
         yield from self._services()
 
     def _rivals(self, name: str, topic: Topic, own: int) -> Iterator[str]:
-        """Yield who publishes an output of which the contract knows one publisher; the node has ``own`` ones."""
+        """Yield who publishes an output of which the contract knows one publisher.
+
+        :param own: how many publishers of it the node has.
+        """
         is_shared = len(topic.publishers) != 1 or topic.name[0] == "/"
         if is_shared or self._node.count_publishers(name) <= own:
             return

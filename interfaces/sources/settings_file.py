@@ -73,6 +73,7 @@ class SettingsFile:
 
 
 def _text(values: dict[str, Any]) -> str:
-    if {*map(type, values.values())} == {float}:  # the time of the drive, 25 times a second: a dump takes 0.1 ms
+    # The time of a drive, 25 times a second: a dump would take 0.1 ms.
+    if {*map(type, values.values())} == {float}:
         return "".join(f"{name}: {value!r}\n" for name, value in values.items())
     return ros_yaml.dump(values)
