@@ -111,7 +111,9 @@ class Run:
         return CompositeDisposable(*subscriptions, self._timer)
 
     def advance(self) -> None:
-        """Answer what has become known."""
+        """Answer what has become known; steady answers wait for their timer."""
+        if self._steady and self._armed_for is not None:
+            return
         try:
             self._advance(self.now())
         except Exception as error:
