@@ -99,16 +99,18 @@ class _SteadyEventsExecutor(Executor):
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         with self._ended_by(future):
-            end = _end(timeout_sec)
+            now, end = time.monotonic(), _end(timeout_sec)
             while not self._ends and not future.done():
-                if self._take_turn(end) >= end:
+                now = self._take_turn(now, end)
+                if now >= end:
                     return
 
     def spin_once_until_future_complete(self, future: Future, timeout_sec: Any = None) -> None:
         with self._ended_by(future):
-            end = _end(timeout_sec)
+            now, end = time.monotonic(), _end(timeout_sec)
             while not self._ends and not future.done():
-                if self._take_turn(end) >= end or self._was_called:
+                now = self._take_turn(now, end)
+                if now >= end or self._was_called:
                     return
 
     @contextmanager
@@ -124,9 +126,8 @@ class _SteadyEventsExecutor(Executor):
         finally:
             future.remove_done_callback(end)
 
-    def _take_turn(self, end: float) -> float:
+    def _take_turn(self, now: float, end: float) -> float:
         """Call what is ready, or wait for it, until ``end`` at most; return the time [s, monotonic]."""
-        now = time.monotonic()
         if now >= self._next_events:
             self._next_events = now + _TURN
             for window in [*self._windows.values()]:

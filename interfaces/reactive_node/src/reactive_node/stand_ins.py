@@ -54,11 +54,12 @@ class Window(_NoNode):
     def refresh(self) -> None:
         """See which entities the node has now.
 
-        This takes the place of a look at each message: nothing else destroys a subscription of a node.
+        This takes the place of a look at each call: nothing else destroys a subscription or timer of a node.
         """
-        present = set(self._node.subscriptions)
-        for subscription, reader in self._stand_ins.get(_Reader, {}).items():
-            reader.lives = subscription in present
+        for kind, entities in ((_Reader, self._node.subscriptions), (_Timer, self._node.timers)):
+            present = set(entities)
+            for entity, stand_in in self._stand_ins.get(kind, {}).items():
+                stand_in.lives = entity in present
         self._events = None
 
     def take_events(self) -> None:
@@ -160,10 +161,11 @@ class _Reader:
 class _Timer:
     def __init__(self, timer: Timer, create_task: CreateTask) -> None:
         self.handle = timer.handle
+        self.lives = True
         self._timer = timer
 
     def callback(self) -> Any:
-        return self._timer.callback() if _lives(self._timer) else None
+        return self._timer.callback() if self.lives else None
 
 
 class _Server:
