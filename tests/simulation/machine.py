@@ -86,11 +86,14 @@ class Machine:
 
         The one supervisor and its sentinel stand for those of both hosts.
         """
-        host, network = running_process().host, self._simulation.network
-        return [each for each in self._simulation.processes if not network.is_cut(each.host, host)]
+        return [each for each in self._simulation.processes if self._reaches(each)]
+
+    def _reaches(self, process: Process) -> bool:
+        return not self._simulation.network.is_cut(process.host, running_process().host)
 
     def _find(self, pid: int) -> Process | None:
-        return next((each for each in self._reachable() if each.pid == pid), None)
+        same = (each for each in self._simulation.processes if each.pid == pid)
+        return next((each for each in same if self._reaches(each)), None)
 
     def _stat_of(self, pid: int) -> list[str]:
         process = self._find(pid)

@@ -157,7 +157,8 @@ class Writer(Endpoint):
         if taps := participant.taps:
             for tap in taps:
                 tap(self, sample)
-            process.settle()  # a tap may have killed or stopped it
+            if process.ended or process.is_suspended or process.interrupts:  # by a tap
+                process.settle()
         self.sent += 1
         if self.is_latched:
             self._history.append((now + self.lifespan, sample))

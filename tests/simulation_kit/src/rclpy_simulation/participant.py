@@ -150,8 +150,8 @@ class Participant:
         return {each.gid: each.user_data for each in (self, *self.known)}
 
     def _everyone(self) -> Iterator[Endpoint]:
-        for endpoints in (self.endpoints, *self.known.values()):
-            yield from endpoints.values()
+        everyone = (self.endpoints, *self.known.values())
+        return itertools.chain.from_iterable(endpoints.values() for endpoints in everyone)
 
     def _note_news(self) -> None:
         if self._discovery is not None:
