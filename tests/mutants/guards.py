@@ -160,10 +160,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
     f"{REACTIVE_NODE}/signals/integral.py": (_OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/replay.py": (_RUNS,),
     f"{REACTIVE_NODE}/signals/values.py": (_SAMPLES, _OPERATIONS),
-    "deploy/supervision/policy.py": (
-        "tests/supervision/test_policy.py",
-        "tests/supervision/test_sentinel.py",
-    ),
+    "deploy/supervision/policy.py": ("tests/supervision/test_policy.py",),
     "deploy/supervision/sentinel.py": (
         "tests/supervision/test_sentinel.py",
         "tests/supervision/test_sentinel_wiring.py",

@@ -71,10 +71,10 @@ def silence_of(seconds: float, name: str) -> Action:
 
 
 def test_nothing_is_inhibited_before_and_after_a_good_observation() -> None:
-    policy = Policy()
-    assert policy.kill_inhibited_by == ""
+    policy, observation = Policy(), Observation(0.0, [program("a")])
+    assert policy.kill_inhibited_by == observation.flood == ""
     assert policy.hears_itself is True
-    assert policy.decide(Observation(0.0, [program("a")])) == []
+    assert policy.decide(observation) == []
     assert policy.kill_inhibited_by == ""
     assert policy.recent_restarts == {"a": 0}
     assert policy.reasons == {}
@@ -82,9 +82,10 @@ def test_nothing_is_inhibited_before_and_after_a_good_observation() -> None:
 
 def test_silent_program_is_killed_at_the_timeout_and_the_reason_kept() -> None:
     run = Run(program("a"), program("b"))
+    run.now = 5.0
     run.hear("ab")
 
-    assert run.first(9.0, healthy="b") == (2.5, [silence_of(2.5, "a")])
+    assert run.first(9.0, healthy="b") == (7.5, [silence_of(2.5, "a")])
     assert run.policy.reasons == {"a": "no sign of life for 2.5 s"}
 
 
@@ -116,6 +117,46 @@ def test_pause_of_the_sentinel_counts_for_no_stop() -> None:
     at, actions = run.first(60.0, healthy="b", stopped="a")
     assert at == 30.5 + 2.5 - 0.5
     assert [each.program for each in actions] == ["a"]
+
+
+def test_stopped_program_is_killed_although_most_are_silent() -> None:
+    run = Run(*map(program, "abc"))
+    run.hear("abc")
+    assert run.first(3.0)[1] == []
+
+    assert run.first(9.0, stopped="a") == (5.75, [Action("kill", "a", PIDS["a"], "stopped for 2.5 s")])
+    assert run.policy.kill_inhibited_by == "2 of 2 services are silent at once"
+
+
+def test_program_that_continues_in_time_is_spared() -> None:
+    run = Run(*map(program, "ab"))
+    for _ in range(3):
+        assert run.first(run.now + 2.0, healthy="ab", stopped="a")[1] == []
+        assert run.first(run.now, healthy="ab")[1] == []
+
+
+def test_program_that_was_stopped_on_purpose_is_spared() -> None:
+    assert Run(program("a", "STOPPED"), program("b")).first(30.0, healthy="b")[1] == []
+
+
+def test_health_of_another_process_of_that_name_does_not_count() -> None:
+    run = Run(program("a")._replace(pid=500), program("b"))
+    while not (actions := run.decide()) and run.now < 30.0:
+        run.now += TIMEOUTS.period
+        run.hear("ab")
+        run.last_beat[500] = run.now
+
+    assert actions == [report_of(20.0, "a")._replace(pid=500)]
+
+
+def test_observation_is_complete_when_each_present_process_has_reported() -> None:
+    programs = [program("a"), program("b")]
+    reports = {("a", PIDS["a"]): 1.0, ("b", 999): 1.0}
+    assert not Observation(2.0, programs, last_health=reports).is_complete
+    reports["b", PIDS["b"]] = 2.0
+    assert Observation(2.0, programs, last_health=reports).is_complete
+    more = [*programs, program("c", "BACKOFF")]
+    assert not Observation(2.0, more, last_health=reports).is_complete
 
 
 def test_duplicate_is_killed_at_the_timeout() -> None:
@@ -216,13 +257,14 @@ def test_service_is_expected_from_the_moment_its_first_health_is_due() -> None:
     assert run.policy.kill_inhibited_by == "2 of 3 services are silent at once"
 
 
-def test_deaf_sentinel_ends_itself_at_the_start_timeout() -> None:
-    run = Run(program(SENTINEL), program("a"))
-    run.hear([SENTINEL, "a"])
+def test_deaf_sentinel_kills_no_other_and_ends_itself_at_the_start_timeout() -> None:
+    run = Run(*map(program, (SENTINEL, "a", "b")))
+    run.hear([SENTINEL, "a", "b"])
 
-    when, actions = run.first(20.0, healthy="a")
-
-    assert (when, actions) == (12.5, [silence_of(12.5, SENTINEL)])
+    assert run.first(12.25, healthy="a")[1] == []
+    assert run.policy.kill_inhibited_by == "the sentinel does not hear itself"
+    assert not run.policy.hears_itself
+    assert run.first(20.0, healthy="a") == (12.5, [silence_of(12.5, SENTINEL)])
 
 
 def test_sentinel_that_heard_itself_can_be_deaf_again() -> None:
@@ -231,6 +273,9 @@ def test_sentinel_that_heard_itself_can_be_deaf_again() -> None:
     assert run.first(12.0, healthy="a")[1] == []
     run.hear([SENTINEL, "a"])
     heard = run.now
+    assert run.decide() == []
+    assert run.policy.hears_itself
+    assert run.policy.kill_inhibited_by == ""
 
     assert run.first(40.0, healthy="a")[0] == heard + 12.5
 
@@ -251,15 +296,15 @@ def test_pauses_of_the_sentinel_count_for_no_silence() -> None:
 
 
 def test_restarts_within_a_minute_are_recent() -> None:
-    run = Run(program("a", restarts=4))
+    run = Run(program("a", restarts=4), program("b"))
     recent = []
     for time, restarts in ((0.0, 4), (10.0, 5), (20.0, 6), (69.5, 6), (70.0, 6), (79.5, 6), (80.0, 6)):
         while run.now < time:
-            run.hear("a")
+            run.hear("ab")
             run.decide()
             run.now += TIMEOUTS.period
         run.programs["a"] = program("a", restarts=restarts)
-        run.hear("a")
+        run.hear("ab")
         run.decide()
         recent.append(run.policy.recent_restarts["a"])
 
@@ -467,6 +512,7 @@ def test_with_each_legal_timeout_only_the_hung_service_is_replaced_and_in_time(
 
 def test_timeouts_that_break_l4_or_the_rule_of_most_are_illegal() -> None:
     within = {each.name: each.within or (0.0, 0.0) for each in declarations(Parameters)}
-    assert within["health_timeout"][1] + within["period"][1] + RESTART <= LIMIT
+    assert within["health_timeout"][0] <= Timeouts.health
+    assert Timeouts.health <= within["health_timeout"][1] <= LIMIT - RESTART - within["period"][1]
     # What fails for most at once is known before the first of them is killed.
     assert within["health_timeout"][0] >= 2 * PERIOD + within["period"][1]

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -10,171 +9,56 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from deploy.supervision import processes, rpc
 from deploy.supervision.errors import DeploymentError
-from deploy.supervision.manifest import SENTINEL
-from deploy.supervision.policy import Action, Observation, Policy, Timeouts
+from deploy.supervision.policy import Observation, Timeouts
 from deploy.supervision.probe import Probe
 from deploy.supervision.processes import Process
 from deploy.supervision.sentinel import reported, states
 from deploy.supervision.supervisord import Program, Supervisord
 
-SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", SENTINEL)
-PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}
+PIDS = {"velocity": 100, "kinematics": 101}
 SUPERVISORD = 9  # the parent of this process may have the pid of another one here
 PERIOD = Timeouts.period
 
 
-def program(name: str, state: str = "RUNNING", pid: int | None = None, uptime: float = 0.0) -> Program:
+FATAL = Program("velocity", "FATAL", 0, 0.0, 7, "code 2", "Exited too quickly", 0.25)
+
+
+def program(name: str, state: str = "RUNNING", pid: int | None = None) -> Program:
     up = state in ("RUNNING", "STARTING")
-    return Program(name, state, (pid or PIDS[name]) if up else 0, uptime, 0, "", "")
+    return Program(name, state, (pid or PIDS[name]) if up else 0, 0.0, 0, "", "")
 
 
-class Run:
-    """A policy with observations of services that report once a second, except the silent ones."""
-
-    def __init__(self) -> None:
-        self.policy = Policy()
-        self.now = 0.0
-        self.last_beat: dict[int, float] = {}
-        self.last_health: dict[tuple[str, int], float] = {}
-        self.programs = {name: program(name) for name in SERVICES}
-
-    def observe(
-        self,
-        seconds: float,
-        *,
-        silent: Iterable[str] = (),
-        stopped: Iterable[int] = (),
-    ) -> list[tuple[float, Action]]:
-        decided = []
-        for _ in range(round(seconds / PERIOD)):
-            self.now += PERIOD
-            if self.now % 1.0 == 0:
-                for each in self.programs.values():
-                    if each.pid and each.name not in silent:
-                        self.last_beat[each.pid] = self.last_health[each.name, each.pid] = self.now
-            observation = Observation(
-                self.now,
-                [*self.programs.values()],
-                dict(self.last_beat),
-                dict(self.last_health),
-                stopped=frozenset(stopped),
-            )
-            decided += [(self.now, action) for action in self.policy.decide(observation)]
-        return decided
+@pytest.mark.parametrize(
+    ("given", "recent", "level", "message"),
+    [
+        (program("velocity"), 2, DiagnosticStatus.OK, "RUNNING"),
+        (program("velocity", "STARTING"), 0, DiagnosticStatus.OK, "STARTING"),
+        (program("velocity"), 3, DiagnosticStatus.WARN, "RUNNING, restarted 3 times within a minute"),
+        (FATAL, 9, DiagnosticStatus.ERROR, "FATAL after 7 restarts Exited too quickly"),
+        (program("velocity", "STOPPED"), 0, DiagnosticStatus.ERROR, "STOPPED after 0 restarts"),
+    ],
+)
+def test_state_of_a_process(given: Program, recent: int, level: bytes, message: str) -> None:
+    (status,) = states([given], {}, {"velocity": recent}, "/sentinel")
+    assert (status.level, status.message) == (level, message)
+    assert (status.name, status.hardware_id) == ("/sentinel: velocity", socket.gethostname())
 
 
-def test_ignores_the_health_of_another_process_of_that_name() -> None:
-    run = Run()
-    run.observe(20.0)
-    run.programs["velocity"] = program("velocity", pid=500)
-    run.last_health["velocity", PIDS["velocity"]] = run.now
-    decided = run.observe(11.0, silent=["velocity"])
-    assert {action.pid for _, action in decided} == {500}
-
-
-def test_kills_a_stopped_process_even_while_all_are_silent() -> None:
-    run = Run()
-    run.observe(20.0)
-    decided = run.observe(4.0, silent=SERVICES, stopped=[PIDS["operator_watchdog"]])
-    assert {action.program for _, action in decided} == {"operator_watchdog"}
-    assert run.policy.kill_inhibited_by
-
-
-def test_spares_a_process_that_is_stopped_briefly() -> None:
-    run = Run()
-    run.observe(20.0)
-    for _ in range(5):
-        assert run.observe(1.0, stopped=[PIDS["velocity"]]) == []
-        assert run.observe(1.0) == []
-
-
-def test_kills_no_silent_service_when_it_does_not_hear_itself() -> None:
-    run = Run()
-    run.observe(20.0)
-    assert run.observe(10.0, silent=[SENTINEL, "kinematics"]) == []
-    assert run.policy.kill_inhibited_by == "the sentinel does not hear itself"
-    assert run.observe(2.0) == []
-    assert not run.policy.kill_inhibited_by
-
-
-def test_reports_whether_it_hears_itself() -> None:
-    run = Run()
-    run.observe(20.0, silent=["kinematics", "velocity"])
-    assert run.policy.hears_itself
-    run.observe(11.0, silent=[SENTINEL])
-    assert not run.policy.hears_itself
-    run.observe(2.0)
-    assert run.policy.hears_itself
-
-
-def test_an_observation_is_complete_when_each_present_process_has_reported() -> None:
-    programs = [program("velocity"), program("kinematics")]
-    reports = {("velocity", PIDS["velocity"]): 1.0, ("kinematics", 999): 1.0}
-    assert not Observation(2.0, programs, last_health=reports).is_complete
-    reports[("kinematics", PIDS["kinematics"])] = 2.0
-    assert Observation(2.0, programs, last_health=reports).is_complete
-    more = [*programs, program(SENTINEL, "BACKOFF")]
-    assert not Observation(2.0, more, last_health=reports).is_complete
-
-
-def test_ends_itself_when_it_does_not_hear_itself_for_long() -> None:
-    run = Run()
-    run.observe(20.0)
-    decided = run.observe(14.0, silent=[SENTINEL, "kinematics"])
-    assert {action.program for _, action in decided} == {SENTINEL}
-    assert 32.0 < decided[0][0] < 34.0
-
-
-def test_kills_no_silent_service_when_most_are_silent_at_once() -> None:
-    run = Run()
-    run.observe(20.0)
-    assert run.observe(30.0, silent=[name for name in SERVICES if name != SENTINEL]) == []
-    assert run.policy.kill_inhibited_by == "4 of 5 services are silent at once"
-    assert run.observe(3.0) == []
-    assert not run.policy.kill_inhibited_by
-
-
-def test_kills_no_silent_service_before_the_first_health() -> None:
-    run = Run()
-    assert {action.program for _, action in run.observe(60.0, silent=SERVICES)} <= {SENTINEL}
-
-
-def test_spares_a_program_that_was_stopped_on_purpose() -> None:
-    run = Run()
-    run.programs["velocity"] = program("velocity", "STOPPED")
-    assert run.observe(30.0) == []
-
-
-def test_warns_of_a_program_that_dies_again_and_again() -> None:
-    run = Run()
-    for restarts in range(8, 12):  # 8 of them before the sentinel was there
-        kinematics = program("kinematics")._replace(restarts=restarts)
-        run.programs["kinematics"] = kinematics
-        run.observe(10.0)
-    (status,) = states([kinematics], {}, run.policy.recent_restarts, "/sentinel")
-    assert (status.level, status.message) == (
-        DiagnosticStatus.WARN,
-        "RUNNING, restarted 3 times within a minute",
-    )
-    run.observe(45.0)  # it has run ever since
-    (status,) = states([kinematics], {}, run.policy.recent_restarts, "/sentinel")
-    assert (status.level, status.message) == (DiagnosticStatus.OK, "RUNNING")
-
-
-def test_publishes_state_pid_restarts_exit_and_reason() -> None:
-    given_up = Program("velocity", "FATAL", 0, 0.0, 7, "code 2", "Exited too quickly", 0.25)
-    status, fatal = states([program("kinematics"), given_up], {"velocity": "no health"}, {}, "/sentinel")
-    assert (status.level, status.name) == (DiagnosticStatus.OK, "/sentinel: kinematics")
-    assert fatal.level == DiagnosticStatus.ERROR
-    assert {pair.key: pair.value for pair in fatal.values} == {
+@pytest.mark.parametrize(
+    ("state", "reason", "why"),
+    [("RUNNING", "", ""), ("RUNNING", "hung", "hung"), ("FATAL", "", FATAL.error), ("FATAL", "hung", "hung")],
+)
+def test_publishes_state_pid_restarts_exit_and_reason(state: str, reason: str, why: str) -> None:
+    (status,) = states([FATAL._replace(state=state, pid=501)], {"velocity": reason}, {}, "/sentinel")
+    assert {pair.key: pair.value for pair in status.values} == {
         "process": "velocity",
-        "state": "FATAL",
-        "pid": "0",
+        "state": state,
+        "pid": "501",
         "restarts": "7",
         "uptime": "0.000",
         "last exit": "code 2",
         "away": "0.250",
-        "why": "no health",
+        "why": why,
     }
 
 
