@@ -94,11 +94,6 @@ class Discovery:
         self._readers = _BuiltinReader(participant, BUILTIN_SUBSCRIPTIONS, BuiltinEndpoint, _endpoint)
 
     @property
-    def news(self) -> list[int]:
-        """The DDS conditions that are true while there are unread changes."""
-        return [self._participants.news, self._writers.news, self._readers.news]
-
-    @property
     def gone(self) -> list[int]:
         return [self._participants.gone, self._writers.gone, self._readers.gone]
 
@@ -107,12 +102,6 @@ class Discovery:
         self._participants.forget_gone()
         self._writers.forget_gone()
         self._readers.forget_gone()
-
-    def refresh(self) -> None:
-        """Read all changes: only later ones trigger the conditions."""
-        self.participants()
-        self.writers()
-        self.readers()
 
     def participants(self) -> dict[bytes, str]:
         return dict(self._participants.alive())

@@ -14,7 +14,6 @@ from rclpy_ground.genuine import InvalidHandle
 from rclpy_ground.interface import Sample
 
 from . import domain, log, qos, security, status
-from .discovery import Discovery
 from .library import (
     ANY_STATE,
     BYTES_HEADER,
@@ -51,23 +50,6 @@ _ONE_PIECE = ct.c_size_t.from_param(1)
 _BEGINNING = ct.c_size_t.from_param(0)
 
 
-def _matched_handles(handle: int, getter: str) -> list[int]:
-    count = getattr(quick, getter)(handle, None, 0)
-    handles = (ct.c_uint64 * max(0, count))()
-    count = getattr(quick, getter)(handle, handles, len(handles))
-    return list(handles[: max(0, min(count, len(handles)))])
-
-
-def _user_data(handle: int, getter: str, other: int) -> str | None:
-    found = getattr(quick, getter)(handle, other)
-    if not found:
-        return None
-    try:
-        return qos.user_data(found.contents.qos)
-    finally:
-        quick.dds_builtintopic_free_endpoint(found)
-
-
 def _guid(handle: int) -> bytes:
     guid = Guid()
     checked(quick.dds_get_guid(handle, ct.byref(guid)), "cannot read a GUID")
@@ -100,9 +82,6 @@ class Participant:
         self.publisher = checked(blocking.dds_create_publisher(self.handle, None, None), "publisher")
         self.subscriber = checked(blocking.dds_create_subscriber(self.handle, None, None), "subscriber")
         self._sertype = None if IS_RECENT else self._find_sertype()
-
-    def create_discovery(self) -> Discovery:
-        return Discovery(self.handle)
 
     def close(self) -> None:
         """Leave the domain and notify peers, which need not wait for the end of a lease."""
@@ -168,6 +147,9 @@ class Participant:
 class _Endpoint:
     """A DDS writer or reader. Wait sets attach its ``handle`` for its statuses."""
 
+    _matching: str
+    """What it is matched with, as functions of DDS name it."""
+
     def __init__(self, handle: int) -> None:
         self.handle = handle
         self._entity = Entity.from_param(handle)
@@ -197,8 +179,31 @@ class _Endpoint:
         """Return the fields of a status if it has changed since the last call, else ``None``."""
         return status.changed(self.handle, name)
 
+    def _matched(self, handles: Any = None, size: int = 0) -> int:
+        return max(0, int(getattr(quick, f"dds_get_matched_{self._matching}s")(self.handle, handles, size)))
+
+    def matched(self) -> int:
+        return self._matched()
+
+    def matched_user_data(self) -> list[str]:
+        handles = (ct.c_uint64 * self._matched())()
+        count = self._matched(handles, len(handles))
+        return [data for other in handles[:count] if (data := self.user_data_of(other)) is not None]
+
+    def user_data_of(self, other: int) -> str | None:
+        """Return the USER_DATA of a matched endpoint, ``None`` if it is no longer matched."""
+        found = getattr(quick, f"dds_get_matched_{self._matching}_data")(self.handle, other)
+        if not found:
+            return None
+        try:
+            return qos.user_data(found.contents.qos)
+        finally:
+            quick.dds_builtintopic_free_endpoint(found)
+
 
 class Writer(_Endpoint):
+    _matching = "subscription"
+
     def __init__(self, handle: int, sertype: int) -> None:
         super().__init__(handle)
         # None once closed: DDS frees it with the writer.
@@ -231,14 +236,6 @@ class Writer(_Endpoint):
                 raise InvalidHandle("cannot use a writer that was destroyed")
             checked(result, "cannot write")
 
-    def matched(self) -> int:
-        return max(0, int(quick.dds_get_matched_subscriptions(self.handle, None, 0)))
-
-    def matched_user_data(self) -> list[str]:
-        handles = _matched_handles(self.handle, "dds_get_matched_subscriptions")
-        found = (_user_data(self.handle, "dds_get_matched_subscription_data", other) for other in handles)
-        return [data for data in found if data is not None]
-
     def wait_for_acks(self, timeout: int) -> bool:
         """Wait at most ``timeout`` [ns] until all reliable readers have acknowledged all samples."""
         result = blocking.dds_wait_for_acks(self.handle, timeout)
@@ -256,6 +253,8 @@ class Writer(_Endpoint):
 
 class Reader(_Endpoint):
     """A DDS reader of CDR. Wait sets attach its ``condition``."""
+
+    _matching = "publication"
 
     def __init__(self, handle: int) -> None:
         super().__init__(handle)
@@ -289,17 +288,6 @@ class Reader(_Endpoint):
                 break
         self._buffers.append(buffer)
         return sample
-
-    def matched(self) -> int:
-        return max(0, int(quick.dds_get_matched_publications(self.handle, None, 0)))
-
-    def matched_user_data(self) -> list[str]:
-        handles = _matched_handles(self.handle, "dds_get_matched_publications")
-        return [data for other in handles if (data := self.user_data_of(other)) is not None]
-
-    def user_data_of(self, publication_handle: int) -> str | None:
-        """Return the USER_DATA of a matched writer, ``None`` if it is no longer matched."""
-        return _user_data(self.handle, "dds_get_matched_publication_data", publication_handle)
 
 
 class GuardCondition:

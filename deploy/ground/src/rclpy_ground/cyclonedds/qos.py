@@ -30,6 +30,18 @@ _XCDR1 = (ct.c_int16 * 1)(0)
 
 
 @contextmanager
+def _with(user_data: str) -> Iterator[int]:
+    """Create a DDS QoS with USER_DATA; the end of the ``with`` frees it."""
+    qos = quick.dds_create_qos()
+    try:
+        encoded = user_data.encode()
+        quick.dds_qset_userdata(qos, encoded, len(encoded))
+        yield qos
+    finally:
+        quick.dds_delete_qos(qos)
+
+
+@contextmanager
 def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
     """Create the DDS QoS of a reader or writer; the end of the ``with`` frees it.
 
@@ -38,8 +50,7 @@ def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
     :raises RCLError: if a policy is UNKNOWN, as in rmw.
     """
     check(profile)
-    qos = quick.dds_create_qos()
-    try:
+    with _with(user_data) as qos:
         quick.dds_qset_writer_data_lifecycle(qos, False)
         quick.dds_qset_data_representation(qos, 1, _XCDR1)
         if profile.history == HistoryPolicy.KEEP_ALL:
@@ -63,25 +74,16 @@ def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
         manual = profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
         lease = nanoseconds(profile.liveliness_lease_duration)
         quick.dds_qset_liveliness(qos, _MANUAL_BY_TOPIC if manual else _AUTOMATIC, lease)
-        encoded = user_data.encode()
-        quick.dds_qset_userdata(qos, encoded, len(encoded))
         yield qos
-    finally:
-        quick.dds_delete_qos(qos)
 
 
 @contextmanager
 def participant_qos(user_data: str, properties: Mapping[str, str]) -> Iterator[int]:
     """Create the DDS QoS of a participant; the end of the ``with`` frees it."""
-    qos = quick.dds_create_qos()
-    try:
+    with _with(user_data) as qos:
         for name, value in properties.items():
             quick.dds_qset_prop(qos, name.encode(), os.fsencode(value))
-        encoded = user_data.encode()
-        quick.dds_qset_userdata(qos, encoded, len(encoded))
         yield qos
-    finally:
-        quick.dds_delete_qos(qos)
 
 
 def user_data(qos: int | None) -> str:
