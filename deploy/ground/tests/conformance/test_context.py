@@ -41,10 +41,6 @@ def test_the_first_context_configures_logging_for_the_process(
         clear_config()
 
 
-def test_init_returns_nothing() -> None:
-    assert rclpy.init(args=[]) is None  # type: ignore[func-returns-value]
-
-
 def test_after_a_signal_and_try_shutdown_init_works_again() -> None:
     rclpy.init(args=[])
     get_default_context().shutdown()  # as a signal does
@@ -59,11 +55,6 @@ def test_shutdown_after_a_signal_says_that_it_is_the_second() -> None:
     context.shutdown()  # as a signal does
     with pytest.raises(rclpy_implementation.RCLError, match="already called"):
         rclpy.shutdown(context=context)
-
-
-def test_shutdown_before_init_says_so() -> None:
-    with pytest.raises(RuntimeError, match="must be initialized"):
-        Context().shutdown()
 
 
 def test_shutdown_of_the_default_context_removes_the_signal_handlers() -> None:

@@ -8,7 +8,7 @@ from contextlib import suppress
 import pytest
 import rclpy
 from deploy.ground.tests.nodes import MakeNode, SpinUntil, subscribe
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import (
@@ -109,13 +109,6 @@ def test_a_future_completed_on_another_thread_ends_spinning_at_once(
     assert (STEADY.now() - before).nanoseconds < 10_000_000_000
 
 
-def test_spinning_once_runs_a_pending_task_without_waiting(executor: SingleThreadedExecutor) -> None:
-    done: list[bool] = []
-    executor.create_task(done.append, True)
-    executor.spin_once(timeout_sec=0)
-    assert done == [True]
-
-
 def test_tasks_run_before_data_and_data_in_the_order_of_creation(
     executor: SingleThreadedExecutor, node: Node, spin_until: SpinUntil
 ) -> None:
@@ -133,21 +126,6 @@ def test_tasks_run_before_data_and_data_in_the_order_of_creation(
     timer = node.create_timer(0.0, start)
     spin_until(lambda: len(order) == 2)
     assert order == ["first", "second"]
-
-
-def test_spin_until_future_complete_gives_up_after_its_timeout(executor: SingleThreadedExecutor) -> None:
-    future: Future = Future()
-    executor.spin_until_future_complete(future, timeout_sec=0.05)
-    assert not future.done()
-
-
-def test_spin_until_future_complete_with_timeout_zero_runs_once(
-    executor: SingleThreadedExecutor, node: Node
-) -> None:
-    future: Future = Future()
-    node.create_guard_condition(lambda: future.set_result("done")).trigger()
-    executor.spin_until_future_complete(future, timeout_sec=0)
-    assert future.result() == "done"
 
 
 def test_an_entity_created_on_another_thread_wakes_the_executor(
@@ -344,29 +322,6 @@ def test_callbacks_of_a_reentrant_group_overlap(make_node: MakeNode, context: Co
     assert not meeting.broken
 
 
-def test_callbacks_of_a_mutually_exclusive_group_never_overlap(make_node: MakeNode, context: Context) -> None:
-    node = make_node()
-    running = threading.Lock()
-    calls: list[bool] = []
-    done: Future = Future()
-
-    def callback(message: Float64) -> None:
-        calls.append(running.acquire(blocking=False))
-        running.release()
-        if len(calls) == 200:
-            done.set_result(None)
-
-    for _ in range(4):
-        node.create_subscription(Float64, "x", callback, 100)
-    publisher = node.create_publisher(Float64, "x", 100)
-    for _ in range(50):
-        publisher.publish(Float64())
-    with MultiThreadedExecutor(4, context=context) as executor:
-        executor.add_node(node)
-        executor.spin_until_future_complete(done, timeout_sec=20)
-    assert calls == [True] * 200
-
-
 class BusyExecutor:
     """A multi-threaded executor whose two threads are kept busy by a subscription's callbacks."""
 
@@ -466,23 +421,3 @@ def test_every_free_thread_gets_work(make_node: MakeNode, context: Context) -> N
         executor.add_node(node)
         executor.spin_until_future_complete(done, timeout_sec=20)
     assert done.done()
-
-
-def test_group_that_another_executor_frees_lets_its_entities_run_again(
-    make_node: MakeNode, executor: SingleThreadedExecutor, node: Node, spin_until: SpinUntil
-) -> None:
-    group = MutuallyExclusiveCallbackGroup()
-    received: list[float] = []
-    node.create_subscription(Float64, "x", lambda it: received.append(it.data), 10, callback_group=group)
-    publisher = node.create_publisher(Float64, "x", 10)
-    spin_until(publisher.get_subscription_count)
-    other = Future()  # stands for an entity of another executor
-    group.add_entity(other)
-
-    assert group.beginning_execution(other)
-    publisher.publish(Float64(data=1.0))
-    executor.spin_once(timeout_sec=0.1)
-    assert received == []
-    group.ending_execution(other)
-
-    spin_until(lambda: received == [1.0])

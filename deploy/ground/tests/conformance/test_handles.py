@@ -33,27 +33,6 @@ def test_an_invalid_name_is_not_resolved(
         resolve(make_node(), name, only_expand=only_expand)
 
 
-@pytest.mark.parametrize(
-    ("ask", "error"),
-    [
-        (Node.count_publishers, InvalidTopicNameException),
-        (Node.count_subscribers, InvalidTopicNameException),
-        (Node.count_services, InvalidServiceNameException),
-        (Node.count_clients, InvalidServiceNameException),
-        (Node.get_publishers_info_by_topic, InvalidTopicNameException),
-        (Node.get_subscriptions_info_by_topic, InvalidTopicNameException),
-    ],
-)
-def test_a_query_for_an_invalid_name_is_an_error(
-    make_node: MakeNode, ask: Callable[..., Any], error: type[Exception]
-) -> None:
-    node = make_node()
-    with pytest.raises(ValueError, match="topic name 'a b' is invalid"):
-        ask(node, "a b")
-    with pytest.raises(error, match="repeated"):
-        ask(node, "a//b")
-
-
 @pytest.mark.parametrize("name", ["", "a b", "a//b"])
 def test_an_invalid_name_creates_nothing(make_node: MakeNode, name: str) -> None:
     node = make_node()

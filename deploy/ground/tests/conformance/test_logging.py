@@ -49,17 +49,6 @@ def test_clear_config_resets_all_levels() -> None:
     assert rclpy.logging.get_logger_effective_level("a") == LoggingSeverity.INFO
 
 
-def test_only_the_named_severities_are_levels() -> None:
-    assert rclpy.logging.get_logging_severity_from_string("warn") == LoggingSeverity.WARN
-    assert rclpy.logging.get_logging_severity_from_string("FATAL") == LoggingSeverity.FATAL
-    with pytest.raises(RuntimeError):
-        rclpy.logging.get_logging_severity_from_string("loud")
-    with pytest.raises(ValueError, match="25 is not a valid"):
-        rclpy.logging.set_logger_level("a", 25)
-    assert get_logger("a").is_enabled_for(LoggingSeverity.INFO)
-    assert not get_logger("a").is_enabled_for(LoggingSeverity.DEBUG)
-
-
 @pytest.mark.parametrize(("message", "shown"), [(None, "(null)"), (b"bytes", "bytes")])
 def test_none_and_bytes_are_logged_as_strings(
     message: object, shown: str, capfd: pytest.CaptureFixture[str]

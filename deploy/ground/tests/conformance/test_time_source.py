@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
 import rclpy.logging
 from builtin_interfaces.msg import Time as TimeMsg
 from deploy.ground.tests.nodes import MakeNode, SpinUntil
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock, ROSClock
+from rclpy.clock import ROSClock
 from rclpy.clock_type import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -55,13 +54,6 @@ def test_a_clock_attached_late_gets_the_latest_time() -> None:
     assert clock.now().nanoseconds == 5_000_000_000
 
 
-def test_only_clocks_of_ros_time_can_be_attached() -> None:
-    with pytest.raises(ValueError, match="ROS_TIME"):
-        TimeSource().attach_clock(Clock(clock_type=ClockType.STEADY_TIME))  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=r"rclpy\.node\.Node"):
-        TimeSource(node="node")  # type: ignore[arg-type]
-
-
 def test_a_node_follows_its_parameter_use_sim_time(make_node: MakeNode) -> None:
     node = make_node()
     assert node.get_parameter("use_sim_time").value is False
@@ -77,12 +69,6 @@ def test_a_node_follows_its_parameter_use_sim_time(make_node: MakeNode) -> None:
 def test_a_node_may_start_in_simulated_time(make_node: MakeNode) -> None:
     node = make_node(parameter_overrides=[Parameter("use_sim_time", value=True)])
     assert node.get_clock().now().nanoseconds == 0
-
-
-def test_use_sim_time_must_be_a_bool(make_node: MakeNode) -> None:
-    node = make_node(allow_undeclared_parameters=True)
-    assert not set_use_sim_time(node, "yes").successful
-    assert node.get_parameter("use_sim_time").value is False
 
 
 def test_simulated_time_follows_the_clock_topic(

@@ -171,24 +171,3 @@ def test_a_rate_wakes_its_sleeper_every_period(executor: SingleThreadedExecutor,
     executor.spin_until_future_complete(end)
     sleeper.join(10)
     assert slept == [True] * 3
-
-
-def test_destroying_a_rate_wakes_its_sleeper(make_node: MakeNode) -> None:
-    node = make_node()
-    rate = node.create_rate(0.001)
-    ended: list[bool] = []
-
-    def sleep() -> None:
-        def for_ever() -> None:
-            while True:
-                rate.sleep()
-
-        with pytest.raises(RuntimeError, match="it has been destroyed"):
-            for_ever()
-        ended.append(True)
-
-    sleeper = threading.Thread(target=sleep)
-    sleeper.start()
-    node.destroy_rate(rate)
-    sleeper.join(10)
-    assert ended == [True]
