@@ -59,11 +59,39 @@ def test_invalid_domain_is_one_line(text: str, monkeypatch: pytest.MonkeyPatch) 
 
 # Discovery ranges
 
+AUTO = "<ParticipantIndex>auto</ParticipantIndex>"
+NO_MULTICAST = "<AllowMulticast>false</AllowMulticast>"
+FOREVER = '<Peer address="127.0.0.1" PruneDelay="inf"/>'
+FROM_ANY_INTERFACE = "<ExtendedPacketInfo>false</ExtendedPacketInfo>"
 
-def test_localhost_is_without_multicast() -> None:
-    configuration = domain.configuration({RANGE: "LOCALHOST"})
-    assert "<AllowMulticast>false</AllowMulticast>" in configuration
-    assert "<ParticipantIndex>auto</ParticipantIndex>" in configuration
+
+@pytest.mark.parametrize(
+    ("environment", "has", "lacks"),
+    [
+        ({RANGE: "LOCALHOST"}, [NO_MULTICAST, AUTO, FOREVER, "<SPDPInterval>8s</SPDPInterval>"], []),
+        (
+            {},  # SUBNET
+            [AUTO, '<Peers><Peer address="127.0.0.1"/></Peers>', FROM_ANY_INTERFACE],
+            ["Multicast", "<SPDPInterval>"],
+        ),
+        ({RANGE: "OFF"}, [NO_MULTICAST, "<Tag>ros_discovery_off_"], []),
+        (
+            {"ROS_STATIC_PEERS": "robot1; 10.0.0.7"},
+            ['<Peer address="robot1"/><Peer address="10.0.0.7"/>'],
+            ["Multicast"],
+        ),
+        (
+            {RANGE: "LOCALHOST", "ROS_STATIC_PEERS": "robot1"},
+            [NO_MULTICAST, f'{FOREVER}<Peer address="robot1"/>', FROM_ANY_INTERFACE],
+            ["<NetworkInterface"],
+        ),
+    ],
+    ids=["LOCALHOST", "SUBNET", "OFF", "SUBNET with peers", "LOCALHOST with peers"],
+)
+def test_each_range_has_its_settings(environment: dict[str, str], has: list[str], lacks: list[str]) -> None:
+    configuration = domain.configuration(environment)
+    assert [text for text in has if text not in configuration] == []
+    assert [text for text in lacks if text in configuration] == []
 
 
 @pytest.mark.parametrize("discovery_range", ["LOCALHOST", "SUBNET"])
@@ -71,12 +99,6 @@ def test_localhost_is_without_multicast() -> None:
 def test_every_index_has_ports(discovery_range: str, domain_id: int, last: int) -> None:
     configuration = domain.configuration({RANGE: discovery_range}, domain_id)
     assert f"<MaxAutoParticipantIndex>{last}</MaxAutoParticipantIndex>" in configuration
-
-
-def test_localhost_asks_on_localhost_forever() -> None:
-    configuration = domain.configuration({RANGE: "LOCALHOST"})
-    assert '<Peer address="127.0.0.1" PruneDelay="inf"/>' in configuration
-    assert "<SPDPInterval>8s</SPDPInterval>" in configuration
 
 
 def test_localhost_uses_loopback_and_default_interface(interfaces: list[tuple[str, int]]) -> None:
@@ -145,10 +167,6 @@ def test_interfaces_of_the_host_are_listed() -> None:
     assert [name for name, flags in found if flags & LOOPBACK]
 
 
-def test_localhost_only_variable_means_localhost() -> None:
-    assert domain.configuration({"ROS_LOCALHOST_ONLY": "1"}) == domain.configuration({RANGE: "LOCALHOST"})
-
-
 @pytest.mark.parametrize("discovery_range", ["OFF", "SUBNET", "SYSTEM_DEFAULT"])
 def test_localhost_only_variable_overrides_range_and_peers(discovery_range: str) -> None:
     new = {RANGE: discovery_range, "ROS_STATIC_PEERS": "robot1"}
@@ -157,23 +175,8 @@ def test_localhost_only_variable_overrides_range_and_peers(discovery_range: str)
     assert domain.configuration({**new, "ROS_LOCALHOST_ONLY": "0"}) == domain.configuration(new)
 
 
-def test_subnet_uses_multicast_and_asks_localhost_at_start() -> None:
-    configuration = domain.configuration({})
-    assert "<ParticipantIndex>auto</ParticipantIndex>" in configuration
-    assert "Multicast" not in configuration
-    assert '<Peers><Peer address="127.0.0.1"/></Peers>' in configuration
-    assert "<SPDPInterval>" not in configuration
-    assert "<ExtendedPacketInfo>false</ExtendedPacketInfo>" in configuration
-
-
 def test_system_default_leaves_all_to_cyclone() -> None:
     assert domain.configuration({RANGE: "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "robot1"}) == ""
-
-
-def test_off_hides_a_process_from_all_others() -> None:
-    configuration = domain.configuration({RANGE: "OFF"})
-    assert "<AllowMulticast>false</AllowMulticast>" in configuration
-    assert "<Tag>ros_discovery_off_" in configuration
 
 
 def test_unknown_range_is_one_line() -> None:
@@ -182,19 +185,6 @@ def test_unknown_range_is_one_line() -> None:
 
 
 # Static peers
-
-
-def test_subnet_asks_static_peers() -> None:
-    configuration = domain.configuration({"ROS_STATIC_PEERS": "robot1; 10.0.0.7"})
-    assert '<Peer address="robot1"/><Peer address="10.0.0.7"/>' in configuration
-
-
-def test_localhost_meets_static_peers_on_any_interface() -> None:
-    configuration = domain.configuration({RANGE: "LOCALHOST", "ROS_STATIC_PEERS": "robot1"})
-    assert '<Peer address="127.0.0.1" PruneDelay="inf"/><Peer address="robot1"/>' in configuration
-    assert "<AllowMulticast>false</AllowMulticast>" in configuration
-    assert "<ExtendedPacketInfo>false</ExtendedPacketInfo>" in configuration
-    assert "<NetworkInterface" not in configuration
 
 
 NODE = """
