@@ -14,22 +14,36 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from interfaces.service import instance
 from tests.system.sites import STEADY, Site
 
-ERRORS = [
-    ("l1: -1.0", "{file}: l1: -1.0 is negative"),
-    ("l3: 1.0", "{file}: scenario: unknown key 'l3'"),
-    ("l1: [", "{file}: "),
+FILES = [
+    ("scenario", "l3: 1.0", "scenario: unknown key 'l3'"),
+    ("scenario", "l1: [", "line 2, column 1: "),
+    ("manifest", "[program:drive]\ncommand = x", "[program:drive] has the name of a program of the arm"),
+    ("parameters", "velocity: {ros__parameters: {rate: 1.0}}", "velocity.rate: is no parameter"),
+    (
+        "parameters",
+        "operator_page: {ros__parameters: {certificate: it.pem}}",
+        "operator_page: certificate '{folder}/it.pem': No such file or directory",
+    ),
+    (
+        "parameters",
+        "operator_page: {ros__parameters: {certificate: /it.pem, key: /k}}",
+        "operator_page: certificate '/it.pem' or key '/k': No such file or directory",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("text", "complaint"), ERRORS)
-def test_an_error_in_a_scenario_is_reported_before_the_start(
-    site: Site, tmp_path: Path, text: str, complaint: str
+@pytest.mark.parametrize(("kind", "text", "complaint"), FILES)
+def test_an_error_in_a_file_is_reported_before_the_start(
+    site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, text: str, complaint: str
 ) -> None:
-    file = tmp_path / "wrong.yaml"
+    file = tmp_path / "mine"
     file.write_text(text)
-    code, printed = site.do("run", str(file))
+    if kind == "manifest":
+        monkeypatch.setenv("MANIFEST", str(file))
+    more = {"scenario": [str(file)], "parameters": [STEADY, str(file)]}.get(kind, [STEADY])
+    code, printed = site.do("start", *more)
     assert code == 1
-    assert printed.startswith(complaint.format(file=file))
+    assert printed.startswith(f"{file}: {complaint.format(folder=tmp_path)}")
     assert "\n" not in printed
     assert not site.run.exists()
 
@@ -41,61 +55,27 @@ def test_an_unknown_scenario_is_reported_with_the_known_ones(site: Site) -> None
     )
 
 
-def test_an_error_in_a_manifest_is_reported_before_the_start(
-    site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = tmp_path / "robot.conf"
-    file.write_text("[program:velocity]\ncommand = python3 -m services.velocity\n")
-    monkeypatch.setenv("MANIFEST", str(file))
-    complaint = "[program:velocity] has the name of a program of the arm: take another name"
-    assert site.do("start", STEADY) == (1, f"{file}: {complaint}")
-    assert not site.run.exists()
-
-
 def test_a_quote_in_scenario_is_no_shell_syntax(site: Site) -> None:
     code, printed = site.do_command("make", "start", "SCENARIO=it's")
     assert code != 0
     assert printed.startswith("SCENARIO=it's is neither a file nor one of: demo, listing_5_9")
 
 
-def test_an_error_in_a_parameter_file_is_reported_before_the_start(site: Site, tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text("operator_watchdog: {ros__parameters: {silence: -1.0}}")
-    complaint = f"{file}: operator_watchdog.silence: must be from 0.1 to 60, not -1.0"
-    assert site.do("start", STEADY, str(file)) == (1, complaint)
-    assert not site.run.exists()
-
-
 @pytest.mark.parametrize(
-    ("page", "complaint"),
+    ("variable", "complaint"),
     [
-        ("{address: abc}", "address: 'abc' is not an IPv4 address"),
-        ("{address: 0.0.0.0}", "address: 0.0.0.0 is not loopback and needs TLS: set certificate and key"),
-        ("{certificate: it.pem}", "certificate '{folder}/it.pem': No such file or directory"),
-        ("{certificate: /it.pem, key: /k}", "certificate '/it.pem' or key '/k': No such file or directory"),
+        ("ROS_DOMAIN_ID=233", " is not a number from 0 to 232"),
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE=OFF", " keeps the services apart: set LOCALHOST or SUBNET"),
+        ("REACTIVE_ARM_NAMESPACE=arm 1", " is no namespace such as /arm1: "),
     ],
 )
-def test_a_page_that_cannot_be_served_is_reported_before_the_start(
-    site: Site, tmp_path: Path, page: str, complaint: str
+def test_a_variable_without_sense_is_reported_before_the_start(
+    site: Site, variable: str, complaint: str
 ) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(f"operator_page: {{ros__parameters: {page}}}")
-    expected = f"{file}: operator_page: {complaint.format(folder=tmp_path)}"
-    assert site.do("start", STEADY, str(file)) == (1, expected)
-    assert not site.run.exists()
-
-
-def test_an_impossible_domain_is_reported(site: Site) -> None:
-    site.domain = 233
-    assert site.do("run", STEADY) == (1, "ROS_DOMAIN_ID=233 is not a number from 0 to 232")
-
-
-def test_a_discovery_range_without_other_processes_is_refused(
-    site: Site, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
-    complaint = "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF keeps the services apart: set LOCALHOST or SUBNET"
-    assert site.do("start", STEADY) == (1, complaint)
+    code, printed = site.do_command("env", variable, *site.command(("run", STEADY)))
+    assert code == 1
+    assert printed.startswith(variable + complaint)
+    assert "\n" not in printed
     assert not site.run.exists()
 
 
@@ -107,14 +87,6 @@ def test_a_loopback_that_is_down_is_reported(site: Site) -> None:
     assert code == 1
     assert re.fullmatch("Cannot join the ROS graph: the .* is down.*ip link set lo up.?", printed)
     assert site.members == {}
-
-
-def test_an_impossible_namespace_is_reported(site: Site) -> None:
-    site.namespace = "arm 1"
-    code, printed = site.do("run", STEADY)
-    assert code == 1
-    assert printed.startswith("REACTIVE_ARM_NAMESPACE=arm 1 is no namespace such as /arm1: ")
-    assert "\n" not in printed
 
 
 @pytest.mark.skipif(
