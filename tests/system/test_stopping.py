@@ -126,14 +126,3 @@ def test_make_stop_elsewhere_ends_terminal_and_logs(small_site: Site) -> None:
         command.await_line("The system has ended")
         assert command.wait() == 0
     assert small_site.members == {}
-
-
-@pytest.mark.parametrize("hung", ["", "engine_controller"])
-def test_stop_ends_hanging_processes_within_two_seconds(small_site: Site, hung: str) -> None:
-    assert small_site.do("start", STEADY)[0] == 0
-    os.kill(small_site.members[hung], signal.SIGSTOP)
-    command = small_site.begin("stop")
-    assert command.wait() == 0
-    assert small_site.members == {}
-    (begin, _), (end, _) = command.lines
-    assert end - begin < 2.0

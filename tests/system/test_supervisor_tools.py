@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from deploy.supervision.run_directory import SETTINGS
-from tests.system.sites import Checkout, Site, make_small_arm
+from tests.system.sites import Checkout, make_small_arm
 
 CONF = ("-c", "deploy/supervisord.conf")
 
@@ -62,23 +62,6 @@ def test_a_start_by_hand_in_the_foreground_prints_its_log(checkout: Checkout) ->
     assert supervisord.wait() == 0, supervisord.output
     assert "Traceback" not in supervisord.output
     assert checkout.members == {}
-
-
-def test_supervisorctl_ends_a_terminal_in_another_run_directory(small_site: Site) -> None:
-    command = small_site.begin("run", "demo")
-    command.await_line("Engines are off")
-    ctl = [
-        str(Path(small_site.python).with_name("supervisorctl")),
-        "-s",
-        f"unix://{small_site.run}/supervisor.sock",
-    ]
-    code, table = small_site.do_command(*ctl, "status")
-    assert code in (0, 3)  # 3: a program is still STARTING
-    assert len(table.splitlines()) == len(small_site.programs)
-    assert small_site.do_command(*ctl, "shutdown") == (0, "Shut down")
-    command.await_line("The system has ended")
-    assert command.wait() == 0
-    assert small_site.members == {}
 
 
 def test_make_stop_needs_neither_venv_nor_run_directory(tmp_path: Path, domain_id: int) -> None:

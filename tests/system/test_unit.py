@@ -94,15 +94,6 @@ def test_a_unit_is_ready_alive_killed_started_again_and_stopped(small_site: Site
     assert small_site.members == {}
 
 
-def test_a_unit_does_not_replace_a_running_system(small_site: Site, systemd: Systemd) -> None:
-    assert small_site.do("start", STEADY)[0] == 0
-    before = small_site.members
-    command = systemd.start()
-    command.await_line("Already running: supervisord has pid")
-    assert command.wait() == 1
-    assert small_site.members == before
-
-
 def test_mistakes_are_refused_before_a_unit_is_written(
     small_site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
