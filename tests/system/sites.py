@@ -151,10 +151,6 @@ class Site:
             "ROS_DOMAIN_ID": str(self.domain),
         }
 
-    def begin_python(self, script: str, *arguments: str) -> Command:
-        path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-        return self._begin([sys.executable, script, *arguments], PYTHONPATH=path)
-
     def begin(self, *arguments: str) -> Command:
         """Begin a command of `make`, without make."""
         return self._begin(self.command(arguments))

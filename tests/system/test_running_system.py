@@ -8,7 +8,6 @@ import os
 import re
 import signal
 import stat
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
+from geometry_msgs.msg import Point, PointStamped
 from std_msgs.msg import Bool, Float64, String
 
 from deploy.supervision import processes
@@ -135,14 +134,6 @@ def test_a_cleaner_of_tmp_leaves_the_run_directory_alone(module_site: Site) -> N
         os.close(directory)
 
 
-def test_no_shell_stands_between_supervisord_and_a_service(module_site: Site) -> None:
-    for program, pid in module_site.members.items():
-        if program:
-            parent = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-            assert parent == module_site.members[""]
-            assert Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")[1:3][0] == b"-m"
-
-
 def test_services_are_forks_of_supervisord(module_site: Site) -> None:
     begins_of_stack = {processes.stat_of(pid)[25] for pid in module_site.members.values()}
     assert len(begins_of_stack) == 1, "it is random for each new interpreter"
@@ -158,20 +149,6 @@ def test_a_late_joiner_gets_the_latched_configuration_and_position(peer: Peer) -
     peer.spin_until(lambda: positions and all(heard.values()))
     assert [heard[name][-1].data for name in ("l1", "l2", "theta1", "theta2")] == [2.0, 3.0, 0.0, 0.0]
     assert (positions[-1].point.x, positions[-1].point.y) == (5.0, 0.0)
-
-
-def test_a_second_instance_of_a_service_refuses_to_start(module_site: Site) -> None:
-    second = subprocess.run(
-        [sys.executable, "-m", "services.kinematics"],
-        cwd=ROOT,
-        env=module_site.environment,
-        capture_output=True,
-        text=True,
-        timeout=150,
-    )
-    assert second.returncode == 1
-    assert second.stderr.count("\n") == 1
-    assert f"/kinematics already runs in domain {module_site.domain}" in second.stderr
 
 
 BAD = [
@@ -340,30 +317,3 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(
         assert command.wait() == 0
         fleet.await_line(r"^/second .* silent +silent ")
     assert module_site.members == first
-
-
-def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) -> None:
-    velocity = peer.publisher(topics.EFFECTOR_TWIST)
-    terminal = module_site.begin_command(sys.executable, "-m", "deploy.commands.launcher", "terminal")
-    terminal.await_line("Engines are off")
-    terminal.insist("press\n", "Operator is alive")
-    terminal.insist("turn_on\n", "Engines are on")
-    states, reports = peer.collect(topics.ENGINES_STATE), peer.collect(topics.DIAGNOSTICS)
-    peer.spin_until(lambda: states and states[-1].data == topics.ON)
-    guard = module_site.begin_python("-m", "services.examples.speed_guard", "--ros-args", "-p", "limit:=3.0")
-
-    def engines_are_off() -> bool:
-        velocity.publish(TwistStamped(twist=Twist(linear=Vector3(x=3.1))))
-        return bool(states[-1].data == topics.OFF)
-
-    def it_has_commanded() -> bool:
-        health = [status for report in reports for status in report.status if status.name == "/speed_guard"]
-        published = (
-            int(pair.value) for status in health for pair in status.values if pair.key == "published"
-        )
-        return any(published)
-
-    peer.spin_until(engines_are_off)
-    peer.spin_until(it_has_commanded)
-    guard.signal(signal.SIGTERM)
-    assert guard.wait() == 0
