@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import ros_yaml
@@ -9,6 +11,7 @@ import ros_yaml
 from deploy.supervision import manifest, parameter_file
 from interfaces.service import UserError
 
+Load = Callable[..., dict[str, Any]]
 PARAMETERS = {
     "config_theta2": {"value", "follow_scenario"},
     "dead_mans_switch": {"rate", "pressed", "hand"},
@@ -18,6 +21,18 @@ PARAMETERS = {
     "operator_page": {"port", "address", "names", "certificate", "key"},
     "sentinel": {"period", "health_timeout", "start_timeout"},
 }
+
+
+@pytest.fixture
+def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Load:
+    """Loads the file `mine.yaml` with a content."""
+    monkeypatch.chdir(tmp_path)
+
+    def load(content: str, namespace: str = "/") -> dict[str, Any]:
+        Path("mine.yaml").write_text(content)
+        return parameter_file.load("mine.yaml", namespace)
+
+    return load
 
 
 def test_the_parameters_of_every_program_are_known() -> None:
@@ -86,25 +101,21 @@ def test_services_are_named_with_the_namespace_or_without(node: str, good: bool)
         ("5", "file: must name services"),
     ],
 )
-def test_an_error_of_yaml_is_one_line_with_the_file(tmp_path: Path, content: str, reason: str) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(content)
-    with pytest.raises(UserError, match=rf"^{file}: {re.escape(reason)}.*$"):
-        parameter_file.load(str(file), "/")
+def test_an_error_of_yaml_is_one_line_with_the_file(load: Load, content: str, reason: str) -> None:
+    with pytest.raises(UserError, match=rf"^mine.yaml: {re.escape(reason)}.*$"):
+        load(content)
 
 
-def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text("""
-        operator_watchdog: {ros__parameters: {silence: -1.0, strikes: 0}}
-        velocity: {ros__parameters: {rate: 1.0}}
-        pilot: {}
-    """)
+def test_all_errors_of_a_file_are_reported_a_line_for_each(load: Load) -> None:
     with pytest.raises(UserError) as raised:
-        parameter_file.load(str(file), "/")
+        load("""
+            operator_watchdog: {ros__parameters: {silence: -1.0, strikes: 0}}
+            velocity: {ros__parameters: {rate: 1.0}}
+            pilot: {}
+        """)
     keys = ["operator_watchdog.silence", "operator_watchdog.strikes", "velocity.rate", "pilot"]
     lines = str(raised.value).splitlines()
-    assert [line.split(": ")[:2] for line in lines] == [[str(file), key] for key in keys]
+    assert [line.split(": ")[:2] for line in lines] == [["mine.yaml", key] for key in keys]
 
 
 @pytest.mark.parametrize(
@@ -163,48 +174,36 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> No
         ),
     ],
 )
-def test_values_that_contradict_each_other_are_refused(tmp_path: Path, content: str, reason: str) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(content)
+def test_values_that_contradict_each_other_are_refused(load: Load, content: str, reason: str) -> None:
     with pytest.raises(UserError) as raised:
-        parameter_file.load(str(file), "/arm1")
-    assert str(raised.value) == f"{file}: {reason}"
+        load(content, "/arm1")
+    assert str(raised.value) == f"mine.yaml: {reason}"
 
 
-def test_value_of_a_service_counts_before_that_of_all_services(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(
-        "{operator_watchdog: {ros__parameters: {strikes: 2}}, "
-        "/**: {ros__parameters: {strikes: 1, silence: 2.0}}}"
-    )
-    found = parameter_file.reaction_to(parameter_file.load(str(file), "/"), "/")
+def test_value_of_a_service_counts_before_that_of_all_services(load: Load) -> None:
+    shared = "/**: {ros__parameters: {strikes: 1, silence: 2.0}}"
+    content = f"{{operator_watchdog: {{ros__parameters: {{strikes: 2}}}}, {shared}}}"
+    found = parameter_file.reaction_to(load(content), "/")
     assert (found.watchdog.strikes, found.watchdog.silence) == (2, 2.0)
 
 
 @pytest.mark.parametrize("content", ["", "# velocity:\n#   ros__parameters: {}\n", "{}"])
-def test_a_file_without_content_changes_nothing(tmp_path: Path, content: str) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(content)
-    assert parameter_file.load(str(file), "/") == {}
+def test_a_file_without_content_changes_nothing(load: Load, content: str) -> None:
+    assert load(content) == {}
 
 
-def test_a_long_value_is_shown_in_part(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(f"operator_watchdog: {{ros__parameters: {{strikes: 0x{5000 * 'f'}}}}}")
+def test_a_long_value_is_shown_in_part(load: Load) -> None:
     with pytest.raises(UserError) as raised:
-        parameter_file.load(str(file), "/")
-    assert len(str(raised.value)) < len(str(file)) + 120
+        load(f"operator_watchdog: {{ros__parameters: {{strikes: 0x{5000 * 'f'}}}}}")
+    assert len(str(raised.value)) < 120
 
 
-def test_1e3_is_a_number(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text("dead_mans_switch: {ros__parameters: {rate: 1e3}}")
-    loaded = parameter_file.load(str(file), "/")
+def test_1e3_is_a_number(load: Load) -> None:
+    loaded = load("dead_mans_switch: {ros__parameters: {rate: 1e3}}")
     assert loaded["/dead_mans_switch"]["ros__parameters"]["rate"] == 1000.0
 
 
-def test_a_file_gets_the_full_names_of_the_nodes(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
+def test_a_file_gets_the_full_names_of_the_nodes(load: Load) -> None:
     parameters = {"ros__parameters": {"value": 1.0}}
-    file.write_text(ros_yaml.dump({"config_l1": parameters, "/arm1/config_l2": parameters}))
-    assert parameter_file.load(str(file), "/arm1").keys() == {"/arm1/config_l1", "/arm1/config_l2"}
+    content = ros_yaml.dump({"config_l1": parameters, "/arm1/config_l2": parameters})
+    assert load(content, "/arm1").keys() == {"/arm1/config_l1", "/arm1/config_l2"}
