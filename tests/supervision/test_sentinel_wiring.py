@@ -301,30 +301,21 @@ def test_simulated_time_that_stands_still_stops_no_supervision(
     assert abs(time.time_ns() - stamp) < 10e9, "reports carry the time of day, by which hosts compare clocks"
 
 
-def test_failed_observation_is_reported_and_not_the_last(wired: Any, spin_until: SpinUntil) -> None:
-    watching = wired()
-    watching.probe.failure = "supervisord has died"
-    spin_until(watching.remarks)
-    assert watching.remarks()[0].startswith(f"{SENTINEL}: supervisord has died")
-
-    watching.probe.failure = ""
-    watching.probe.programs = [VELOCITY._replace(state="FATAL", pid=0)]
-    spin_until(lambda: watching.states()[-1:] and "FATAL" in watching.states()[-1].status[0].message)
-
-
-def test_states_are_not_repeated_while_observations_fail(
+def test_failed_observation_is_reported_and_repeats_no_state(
     wired: Any, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:
     watching = wired()
     spin_until(lambda: len(watching.states()) >= 2)
     watching.probe.failure = "supervisord has died"
     spin_until(watching.remarks)
+    assert watching.remarks()[0].startswith(f"{SENTINEL}: supervisord has died")
     before = len(watching.states())
     spin_for(1.5)
     assert len(watching.states()) == before
 
     watching.probe.failure = ""
-    spin_until(lambda: len(watching.states()) > before)
+    watching.probe.programs = [VELOCITY._replace(state="FATAL", pid=0)]
+    spin_until(lambda: "FATAL" in watching.states()[-1].status[0].message)
 
 
 def test_warnings_of_the_machine_stand_in_each_report(
