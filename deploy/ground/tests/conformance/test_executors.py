@@ -47,14 +47,6 @@ def after(event: threading.Event, action: Callable[[], object]) -> threading.Thr
     return threading.Thread(target=lambda: event.wait() and action())
 
 
-def test_messages_arrive_within_one_process(spin_until: SpinUntil, node: Node) -> None:
-    received, publish = subscribe(node)
-    for number in range(5):
-        publish(float(number))
-    spin_until(lambda: len(received) == 5)
-    assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
-
-
 def test_a_slow_callback_delays_others_by_at_most_one_call(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
@@ -96,17 +88,6 @@ def test_spin_once_with_timeout_zero_runs_a_ready_callback(
     node.create_guard_condition(lambda: triggered.append(True)).trigger()
     executor.spin_once(timeout_sec=0)
     assert triggered == [True]
-
-
-def test_a_future_completed_on_another_thread_ends_spinning_at_once(
-    executor: SingleThreadedExecutor,
-) -> None:
-    future: Future = Future()
-    threading.Timer(0.05, lambda: future.set_result("done")).start()
-    before = STEADY.now()
-    executor.spin_until_future_complete(future, timeout_sec=20)
-    assert future.result() == "done"
-    assert (STEADY.now() - before).nanoseconds < 10_000_000_000
 
 
 def test_tasks_run_before_data_and_data_in_the_order_of_creation(

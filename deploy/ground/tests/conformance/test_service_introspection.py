@@ -86,11 +86,6 @@ def test_both_events_of_a_side_carry_the_same_client_gid(introspected: Introspec
     assert received == answered
 
 
-def test_metadata_omits_requests_and_responses(introspected: Introspected) -> None:
-    introspected.configure(METADATA)
-    assert all(event.request == event.response == [] for event in introspected.call())
-
-
 def test_changing_the_state_and_destroying_leaves_no_publisher(
     introspected: Introspected, spin_until: SpinUntil
 ) -> None:
@@ -103,12 +98,6 @@ def test_changing_the_state_and_destroying_leaves_no_publisher(
     introspected.node.destroy_service(introspected.service)
     introspected.node.destroy_client(introspected.client)
     spin_until(lambda: introspected.node.count_publishers("negate/_service_event") == 0)
-
-
-def test_the_event_publisher_is_not_listed_among_the_nodes_publishers(introspected: Introspected) -> None:
-    before = list(introspected.node.publishers)
-    introspected.configure(METADATA)
-    assert list(introspected.node.publishers) == before
 
 
 @pytest.mark.parametrize("side", ["service", "client"])

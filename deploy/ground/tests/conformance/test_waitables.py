@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from deploy.ground.tests.nodes import MakeNode, SpinUntil
+from deploy.ground.tests.nodes import SpinUntil
 from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -99,14 +99,6 @@ def test_a_guard_condition_runs_a_waitable(
     spin_until(lambda: len(bell.executed) == 2)
 
 
-def test_a_trigger_of_another_thread_ends_the_wait(bell: Bell, executor: SingleThreadedExecutor) -> None:
-    started = time.monotonic()
-    threading.Timer(0.05, bell.guard.trigger).start()
-    while not bell.executed:
-        executor.spin_once(timeout_sec=30)
-    assert time.monotonic() - started < 30
-
-
 def test_a_waitable_may_have_a_guard_condition_of_the_extension(
     bell: Bell, context: Context, spin_until: SpinUntil
 ) -> None:
@@ -137,32 +129,6 @@ def test_an_overdue_timer_runs_a_waitable(node: Node, context: Context, spin_unt
     spin_until(lambda: ticker.ticks >= 1)
     ticker.timer.cancel()
     node.remove_waitable(ticker)
-
-
-def test_a_removed_waitable_does_not_run(
-    bell: Bell, node: Node, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    assert bell in list(node.waitables)
-    node.remove_waitable(bell)
-    assert bell not in list(node.waitables)
-    bell.guard.trigger()
-    for _ in range(3):
-        executor.spin_once(timeout_sec=0.01)
-    assert bell.executed == []
-    with pytest.raises(ValueError, match="not in list"):
-        node.remove_waitable(bell)
-
-
-def test_a_waitable_of_a_node_that_is_added_later_runs(
-    make_node: MakeNode, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
-) -> None:
-    node = make_node("late")
-    bell = Bell(context, ReentrantCallbackGroup())
-    node.add_waitable(bell)
-    bell.guard.trigger()
-    executor.add_node(node)
-    spin_until(lambda: bell.executed)
-    node.remove_waitable(bell)
 
 
 def test_several_waitables_and_other_entities_share_an_executor(
