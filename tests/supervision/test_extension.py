@@ -39,29 +39,21 @@ def own_signals() -> Iterator[None]:
         signal.set_wakeup_fd(before)
 
 
-def interface_of(*states: int, poller: Any) -> ArmInterface:
-    processes = {
-        str(number): SimpleNamespace(get_state=lambda state=state: state)
-        for number, state in enumerate(states)
-    }
-    group = SimpleNamespace(processes=processes)
+def interface_of(poller: Any, **processes: Any) -> ArmInterface:
     options = SimpleNamespace(poller=poller)
+    group = SimpleNamespace(processes=processes)
     return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
+
+
+def in_state(state: int) -> SimpleNamespace:
+    return SimpleNamespace(get_state=lambda: state)
 
 
 def interface_with(name: str = "velocity", **fields: Any) -> tuple[ArmInterface, SimpleNamespace]:
     """Return an interface, and the process of its program."""
-    process = SimpleNamespace(
-        config=SimpleNamespace(name=name),
-        get_state=lambda: ProcessStates.RUNNING,
-        pid=1000,
-        spawnerr=None,
-        backoff=0,
-        **fields,
-    )
-    group = SimpleNamespace(processes={name: process})
-    options = SimpleNamespace(poller=SimpleNamespace(poll=lambda timeout: ([], [])))
-    return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group})), process
+    process = in_state(ProcessStates.RUNNING)
+    vars(process).update(config=SimpleNamespace(name=name), pid=1000, spawnerr=None, backoff=0, **fields)
+    return interface_of(SimpleNamespace(poll=lambda timeout: ([], [])), **{name: process}), process
 
 
 def test_supervisor_is_the_one_whose_names_are_replaced() -> None:
@@ -187,8 +179,8 @@ def test_supervisord_sleeps_unless_a_program_changes(state: int, monkeypatch: py
         return [], []
 
     settled, changing = SimpleNamespace(poll=poll), SimpleNamespace(poll=poll)
-    interface_of(ProcessStates.RUNNING, ProcessStates.FATAL, poller=settled)
-    interface_of(ProcessStates.RUNNING, state, poller=changing)
+    interface_of(settled, a=in_state(ProcessStates.RUNNING), b=in_state(ProcessStates.FATAL))
+    interface_of(changing, a=in_state(ProcessStates.RUNNING), b=in_state(state))
     settled.poll(1.0)
     changing.poll(1.0)
     assert waits == [1.0, LONGEST_WAIT]
@@ -201,7 +193,7 @@ def test_signal_wakes_supervisord(monkeypatch: pytest.MonkeyPatch) -> None:
     before = signal.signal(signal.SIGUSR2, lambda number, frame: None)
     try:
         with own_signals():
-            interface_of(ProcessStates.RUNNING, poller=poller).wake_at_signals()
+            interface_of(poller).wake_at_signals()
             killed.start()
             began = time.monotonic()
             assert poller.poll(30.0) == ([], [])

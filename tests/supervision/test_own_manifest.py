@@ -34,6 +34,13 @@ def own(tmp_path: Path) -> Path:
     return tmp_path / "robot.conf"
 
 
+def section(name: str) -> dict[str, str]:
+    """Return the settings of a program in the chosen manifest."""
+    conf = configparser.RawConfigParser()
+    conf.read(manifest.path())
+    return dict(conf[f"program:{name}"])
+
+
 def test_without_a_file_the_manifest_is_ours() -> None:
     with manifest.chosen(""):
         assert manifest.path() == manifest.PATH
@@ -44,12 +51,10 @@ def test_own_programs_join_ours_with_the_same_settings(own: Path) -> None:
     with manifest.chosen(str(own)):
         *ours, guard = manifest.programs()
         assert (tuple(ours), guard) == (OURS, manifest.Program("guard", "services.examples.speed_guard", ()))
-        conf = configparser.RawConfigParser()
-        conf.read(manifest.path())
-    shared, section = dict(conf["program:kinematics"]), dict(conf["program:guard"])
+        shared, settings = section("kinematics"), section("guard")
     arguments = f"--ros-args -r __node:=guard --params-file {run_directory()}/parameters.yaml"
     command = f"python3 -m services.examples.speed_guard {arguments}"
-    assert section == shared | {"command": command, "startsecs": "3", "stopwaitsecs": "2"}
+    assert settings == shared | {"command": command, "startsecs": "3", "stopwaitsecs": "2"}
 
 
 def test_own_program_with_a_directory_finds_its_parameters(
@@ -59,9 +64,7 @@ def test_own_program_with_a_directory_finds_its_parameters(
     monkeypatch.setenv("REACTIVE_ARM_RUN_DIR", str(run))
     own.write_text(GUARD + "directory = /tmp\n")
     with manifest.chosen(str(own)):
-        conf = configparser.RawConfigParser()
-        conf.read(manifest.path())
-    words = shlex.split(conf["program:guard"]["command"] % {})  # as supervisord reads it
+        words = shlex.split(section("guard")["command"] % {})  # as supervisord reads it
     assert words[-1] == str(run / "parameters.yaml")
 
 
@@ -73,9 +76,7 @@ def test_paths_of_own_program_count_from_its_file(
     (own.parent / "100%" / "work").mkdir(parents=True)
     own.write_text(GUARD + f"directory = {directory}\n")
     with manifest.chosen(str(own)):
-        conf = configparser.RawConfigParser()
-        conf.read(manifest.path())
-    assert conf["program:guard"]["directory"] % {} == str(own.parent / "100%" / "work")
+        assert section("guard")["directory"] % {} == str(own.parent / "100%" / "work")
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,15 @@ HARMFUL = {
 }
 
 
+def run(*command: str, **environment: str) -> tuple[int, str, str]:
+    """Run a command in the checkout, with more variables; return its exit code and what it prints."""
+    shell = os.environ | environment
+    done = subprocess.run(
+        command, cwd=ROOT, env=shell, capture_output=True, text=True, stdin=subprocess.DEVNULL
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
 @pytest.mark.parametrize(("row", "name"), ROWS)
 def test_services_get_what_the_table_says(row: Variable, name: str) -> None:
     assert row.decision in (RESPECTED, OVERRIDDEN, REFUSED)
@@ -64,14 +73,9 @@ def test_services_get_what_the_table_says(row: Variable, name: str) -> None:
 
 @pytest.mark.parametrize(("row", "name"), [each for each in ROWS if each.values[1].startswith(EARLY)])
 def test_interpreter_gets_what_the_table_says(row: Variable, name: str) -> None:
-    done = subprocess.run(
-        ["sh", "-ec", '. deploy/commands/entry.sh; printenv "$0" || echo no', name],
-        cwd=ROOT,
-        env=os.environ | {name: "theirs"},
-        capture_output=True,
-        text=True,
-    )
-    assert (done.stdout, done.stderr) == ("no\n" if row.decision == OVERRIDDEN else "theirs\n", "")
+    show = '. deploy/commands/entry.sh; printenv "$0" || echo no'
+    printed = "no\n" if row.decision == OVERRIDDEN else "theirs\n"
+    assert run("sh", "-ec", show, name, **{name: "theirs"}) == (0, printed, "")
 
 
 @pytest.mark.parametrize(("row", "name"), [each for each in ROWS if each.values[1].startswith("PIP_")])
@@ -109,30 +113,23 @@ def test_value_that_cannot_be_obeyed_is_refused_by_name(
 
 @pytest.mark.parametrize("name", HARMFUL)
 def test_harmful_variable_does_no_harm(name: str, tmp_path: Path) -> None:
-    shell = os.environ | {name: HARMFUL[name], "REACTIVE_ARM_RUN_DIR": str(tmp_path)}
+    shell = {name: HARMFUL[name], "REACTIVE_ARM_RUN_DIR": str(tmp_path)}
     for command in (["make", "stop"], ["deploy/commands/venv.sh", "-c", "print('Nothing runs.')"]):
-        done = subprocess.run(
-            command, cwd=ROOT, env=shell, capture_output=True, text=True, stdin=subprocess.DEVNULL
-        )
-        assert (done.returncode, done.stdout, done.stderr) == (0, "Nothing runs.\n", "")
+        assert run(*command, **shell) == (0, "Nothing runs.\n", "")
 
 
 def test_own_module_hides_none_that_the_arm_needs(tmp_path: Path) -> None:
     for name in ("queue", "yaml", "signal_of_mine"):
         (tmp_path / f"{name}.py").write_text("mine = True")
     code = "import queue, yaml, signal_of_mine; print(hasattr(queue, 'mine'), hasattr(yaml, 'mine'))"
-    shell = os.environ | {"PYTHONPATH": str(tmp_path)}
-    done = subprocess.run(
-        ["deploy/commands/venv.sh", "-c", code], cwd=ROOT, env=shell, capture_output=True, text=True
-    )
-    assert (done.stdout, done.stderr) == ("False False\n", "")
+    shown = run("deploy/commands/venv.sh", "-c", code, PYTHONPATH=str(tmp_path))
+    assert shown == (0, "False False\n", "")
 
 
 def test_own_module_does_not_hide_those_of_the_set_up(tmp_path: Path) -> None:
     (tmp_path / "signal.py").write_text("raise SystemExit('mine')")
-    shell = os.environ | {"PYTHONPATH": str(tmp_path), "REACTIVE_ARM_RUN_DIR": str(tmp_path / "run")}
-    done = subprocess.run(["make", "stop"], cwd=ROOT, env=shell, capture_output=True, text=True)
-    assert (done.stdout, done.stderr) == ("Nothing runs.\n", "")
+    shell = {"PYTHONPATH": str(tmp_path), "REACTIVE_ARM_RUN_DIR": str(tmp_path / "run")}
+    assert run("make", "stop", **shell) == (0, "Nothing runs.\n", "")
 
 
 @pytest.mark.parametrize("value", ["0", "1", ""])
