@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import pytest
 import rclpy
-from deploy.ground.tests.nodes import MakeNode, SpinUntil, subscribe
+from deploy.ground.tests.nodes import MakeNode, SpinUntil
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -230,47 +230,6 @@ def test_context_shutdown_ends_spin_until_future_complete(
     executor.spin_until_future_complete(Future(), timeout_sec=20)
     assert not context.ok()
     executor.spin_until_future_complete(Future(), timeout_sec=20)
-
-
-def test_ready_callbacks_move_with_their_node(
-    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
-) -> None:
-    node = make_node()
-    threads: list[str] = []
-    with SingleThreadedExecutor(context=context) as other:
-
-        def leave() -> None:
-            threads.append("first")
-            other.add_node(node)
-
-        executor.add_node(node)
-        node.create_guard_condition(leave).trigger()
-        node.create_guard_condition(lambda: threads.append("second")).trigger()
-        executor.spin_once(timeout_sec=5)
-        task = executor.create_task(lambda: None)
-        executor.spin_once(timeout_sec=0)
-        assert task.done()
-        executor.spin_once(timeout_sec=0)
-        assert threads == ["first"]
-        other.spin_once(timeout_sec=5)
-        assert threads == ["first", "second"]
-
-
-def test_unread_messages_of_a_removed_node_wait_for_its_return(
-    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    received, publish = subscribe(node)
-    for number in range(3):
-        publish(float(number))
-    executor.add_node(node)
-    spin_until(lambda: received)
-    executor.remove_node(node)
-    executor.spin_once(timeout_sec=0)
-    assert received == [0.0]
-    executor.add_node(node)
-    spin_until(lambda: len(received) == 3)
-    assert received == [0.0, 1.0, 2.0]
 
 
 def test_a_callback_may_spin_its_executor(executor: SingleThreadedExecutor, node: Node) -> None:
