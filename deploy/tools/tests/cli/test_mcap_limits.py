@@ -51,6 +51,11 @@ class Forger(Writer):
         self.finish()  # type: ignore[no-untyped-call]
         return self.file.getvalue()
 
+    def opened(self, folder: Path) -> McapFile:
+        path = folder / "x.mcap"
+        path.write_bytes(self.content())
+        return McapFile(path)
+
 
 def zstd(size: int, head: bytes = b"", *, declared: bool = False) -> bytes:
     """Return a few kB that unpack to a head and zeros."""
@@ -139,59 +144,48 @@ def test_bomb_is_refused_in_one_line(bomb: str, tmp_path: Path) -> None:
 
 
 def test_messages_that_a_program_keeps_have_a_limit(tmp_path: Path) -> None:
-    file, path = Forger(), tmp_path / "x.mcap"
+    file = Forger()
     file.messages(12, bytes(100 * MB))
-    path.write_bytes(file.content())
-    with (
-        McapFile(path) as kept,
-        pytest.raises(UnreadableError, match=TOO_MANY),
-    ):
+    with file.opened(tmp_path) as kept, pytest.raises(UnreadableError, match=TOO_MANY):
         for _ in kept.kept(["/chatter"]):
             pass
 
 
 def test_file_that_declares_too_many_messages_is_not_kept(tmp_path: Path) -> None:
-    file, path = Forger(), tmp_path / "x.mcap"
+    file = Forger()
     file.messages(2)
     file.own("statistics").message_count = file.own("statistics").channel_message_counts[1] = 1 << 60
-    path.write_bytes(file.content())
-    with (
-        McapFile(path) as kept,
-        pytest.raises(UnreadableError, match=TOO_MANY),
-    ):
+    with file.opened(tmp_path) as kept, pytest.raises(UnreadableError, match=TOO_MANY):
         next(kept.kept(["/chatter"]))
 
 
 def test_chunk_that_is_indexed_twice_is_read_once(tmp_path: Path) -> None:
-    file, path = Forger(), tmp_path / "x.mcap"
+    file = Forger()
     file.messages(5)
     indexes = file.own("chunk_indices")
     indexes += 999 * indexes
     file.own("statistics").chunk_count = len(indexes)
-    path.write_bytes(file.content())
-    with McapFile(path) as read:
+    with file.opened(tmp_path) as read:
         assert len(list(read.messages())) == read.counts.total() == 5
 
 
 def test_metadata_that_is_indexed_twice_is_read_once(tmp_path: Path) -> None:
-    file, path = Forger(), tmp_path / "x.mcap"
+    file = Forger()
     file.add_metadata("arm", {"origin": "7"})
     file.messages(5)
     indexes = file.own("metadata_indexes")
     indexes += 999 * indexes
     file.own("statistics").metadata_count = len(indexes)
-    path.write_bytes(file.content())
-    with McapFile(path) as read:
+    with file.opened(tmp_path) as read:
         assert [each.metadata for each in read.metadata] == [{"origin": "7"}]
 
 
 def test_index_of_metadata_that_points_elsewhere_is_not_followed(tmp_path: Path) -> None:
-    file, path = Forger(), tmp_path / "x.mcap"
+    file = Forger()
     file.messages(5)
     file.own("metadata_indexes").append(MetadataIndex(8, 30, "arm"))
     file.own("statistics").metadata_count = 1
-    path.write_bytes(file.content())
-    with McapFile(path) as read:
+    with file.opened(tmp_path) as read:
         assert (read.metadata, read.counts.total()) == ([], 5)
 
 
