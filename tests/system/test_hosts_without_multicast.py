@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
@@ -20,6 +19,7 @@ from deploy.supervision.environment import RANGE, set_middleware
 from deploy.supervision.processes import ROOT
 from tests.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
 from tests.system.sites import LIMIT, STEADY, Command, Site
+from tests.system.test_two_hosts import Host
 
 NAMES = f"127.0.0.1 localhost\n{NETWORK}.1 {ROBOT}.example\n{NETWORK}.2 {CONTROL}.example\n"
 AS_HOST = 'hostname "$0-host" && mount --bind "$1" /etc/hosts && shift && exec "$@"'
@@ -33,33 +33,20 @@ PEERS = {
 CLIENT = {RANGE: "SUBNET", "ROS_DISCOVERY_SERVER": f"{NETWORK}.1:{PORT}"}
 
 
-class Host:
-    """One of the hosts."""
+class NamedHost(Host):
+    """One of the hosts, on which both have names."""
 
-    def __init__(self, name: str, namespace: str, base: Path, domain: int) -> None:
-        self._site = Site(base / name, domain)
-        self._within = ["ip", "netns", "exec", namespace]
-        self._as_host = ["unshare", "--uts", "--mount", "sh", "-c", AS_HOST, name, str(base / "hosts")]
-        way = PEERS[name] if IS_CYCLONE else CLIENT
-        self._environment = self._site.environment | way | {manifest.HOST: name}
-        set_middleware(self._environment)
-        self.close = self._site.close
-
-    def begin(self, *command: str) -> Command:
-        return self._site.begin_alone([*self._within, *self._as_host, *command], self._environment)
-
-    def launch(self, *arguments: str) -> Command:
-        """Begin a command of `make`, without make."""
-        return self.begin(sys.executable, "-m", "deploy.commands.launcher", *arguments)
-
-    def status(self) -> str:
-        command = self.launch("status")
-        assert command.wait() == 0, command.output
-        return command.output
+    def begin_command(self, *command: str, **environment: str) -> Command:
+        way = PEERS[self.name] if IS_CYCLONE else CLIENT
+        settings = self.site.environment | way | {manifest.HOST: self.name} | environment
+        set_middleware(settings)
+        names = str(self.site.run.with_name("hosts"))
+        as_host = ["unshare", "--uts", "--mount", "sh", "-c", AS_HOST, self.name, names]
+        return self.site.begin_alone([*self._within, *as_host, *command], settings)
 
 
 @pytest.fixture
-def hosts(tmp_path: Path, domain_id: int) -> Iterator[dict[str, Host]]:
+def hosts(tmp_path: Path, domain_id: int) -> Iterator[dict[str, NamedHost]]:
     """The two hosts, on a line that carries no multicast."""
     if reason := missing() or ("" if IS_CYCLONE or SERVER else "there is no fast-discovery-server"):
         pytest.skip(f"platform: {reason}")
@@ -70,25 +57,25 @@ def hosts(tmp_path: Path, domain_id: int) -> Iterator[dict[str, Host]]:
             port = ["dev", host, "type", "bridge_slave", "mcast_flood", "off"]
             subprocess.run(["ip", "-n", full(BRIDGE), "link", "set", *port], check=True)
         hosts = {
-            name: stack.enter_context(closing(Host(name, full(name), tmp_path, domain_id)))
+            name: NamedHost(name, full(name), stack.enter_context(closing(Site(tmp_path / name, domain_id))))
             for name in (ROBOT, CONTROL)
         }
         if not IS_CYCLONE:
-            server = hosts[ROBOT].begin(str(SERVER), "-i", "0", "-l", f"{NETWORK}.1", "-p", str(PORT))
+            server = hosts[ROBOT].begin_command(str(SERVER), "-i", "0", "-l", f"{NETWORK}.1", "-p", str(PORT))
             server.await_line("Server is running")
         yield hosts
 
 
-def test_arm_on_two_hosts_needs_no_multicast(hosts: dict[str, Host]) -> None:
+def test_arm_on_two_hosts_needs_no_multicast(hosts: dict[str, NamedHost]) -> None:
     for host in hosts.values():
-        start = host.launch("start", STEADY)
+        start = host.begin("start", STEADY)
         assert start.wait(2 * LIMIT) == 0, start.output
-    view, terminal = (hosts[name].launch("terminal") for name in (ROBOT, CONTROL))
+    view, terminal = (hosts[name].begin("terminal") for name in (ROBOT, CONTROL))
     terminal.insist("press\nturn_on\n", "Engines are on")
     view.await_line("Engines are on")
     for name, other in ((ROBOT, CONTROL), (CONTROL, ROBOT)):
         deadline = time.monotonic() + LIMIT
-        while not shows_both(printed := hosts[name].status(), other):
+        while not shows_both(printed := hosts[name].do("status"), other):
             assert time.monotonic() < deadline, printed
 
 
