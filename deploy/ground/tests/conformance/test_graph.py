@@ -56,10 +56,6 @@ def test_nodes_of_another_participant_appear_and_disappear(
     spin_until(lambda: here.get_node_names() == ["here"])
 
 
-def test_waiting_for_a_missing_node_ends_with_the_timeout(make_node: MakeNode) -> None:
-    assert not make_node().wait_for_node("/missing", timeout=0.05)
-
-
 def test_topics_and_types_are_listed_with_and_without_demangling(node: Node) -> None:
     topics = dict(node.get_topic_names_and_types())
     assert topics["/arm1/l1"] == ["std_msgs/msg/Float64"]

@@ -160,11 +160,6 @@ def test_other_nodes_ask_for_transitions_by_number_or_label(call: Call, state: S
     assert state() == "active"
 
 
-def test_other_nodes_learn_whether_a_transition_has_failed(machine: Machine, call: Call) -> None:
-    machine.results["configure"] = FAILURE
-    assert not call(ChangeState, "machine/change_state", transition=Transition(label="configure")).success
-
-
 def test_other_nodes_learn_states_and_transitions(machine: Machine, call: Call) -> None:
     states = call(GetAvailableStates, "machine/get_available_states").available_states
     assert {(state.id, state.label) for state in states} == {

@@ -46,14 +46,6 @@ def test_a_clock_follows_an_active_time_source() -> None:
     assert not clock.ros_time_is_active
 
 
-def test_a_clock_attached_late_gets_the_latest_time() -> None:
-    source, clock = TimeSource(), ROSClock()
-    source.ros_time_is_active = True
-    source.clock_callback(ClockMsg(clock=TimeMsg(sec=5)))
-    source.attach_clock(clock)
-    assert clock.now().nanoseconds == 5_000_000_000
-
-
 def test_a_node_follows_its_parameter_use_sim_time(make_node: MakeNode) -> None:
     node = make_node()
     assert node.get_parameter("use_sim_time").value is False
