@@ -34,9 +34,9 @@ CONDITIONS = (OVERLOAD, LOSS, SILENCE)
 released the switch."""
 
 HOST = "host"
+"""In the value of a health report, the name of the reporter's host."""
 SAID = "said"
 """The message of a report of health that warns."""
-"""In the value of a health report, the name of the reporter's host."""
 PARTITION = "partition"
 """A fault of the network between the operator's host and the robot's."""
 BAD_LINE = "bad_line"
