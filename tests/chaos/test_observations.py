@@ -25,18 +25,26 @@ from tests.promises.marks import STEP
 from tests.promises.observations import FAULTS, PROCESSES, load, values
 
 
-def recorded(path: Path, *lives: Life, seconds: int = 20) -> bytes:
-    """Write a record with processes, and a speed each second; return its bytes."""
+def recorded(
+    path: Path,
+    *events: Life | InjectedFault | Condition,
+    seconds: int = 20,
+    late: Callable[[int], float] = lambda second: 0.002,
+    ahead: Callable[[int], float] = lambda second: 0.0,
+) -> bytes:
+    """Write a record with events, and a speed at each second; return its bytes.
+
+    :param late: returns how long the message of a second takes [s].
+    :param ahead: returns by how much its stamp is ahead [s].
+    """
     recorder = Recorder(path, 0, 10**18)
-    for life in lives:
-        recorder.event(PROCESSES, 1, life._asdict() | {"namespace": "/"})
-    speed = topics.EFFECTOR_SPEED
-    data = serialize_message(Float64(data=1.5))
+    for event in events:
+        topic = PROCESSES if isinstance(event, Life) else FAULTS
+        recorder.event(topic, 1, event._asdict() | {"namespace": "/"})
+    speed, data = topics.EFFECTOR_SPEED, serialize_message(Float64(data=1.5))
     for second in range(seconds):
-        sent = second * 10**9
-        recorder.message(
-            "/effector/speed", speed.type_name, qos_profiles(speed), data, sent + 2_000_000, sent + 1_000_000
-        )
+        received, stamp = (round((second + more(second)) * 1e9) for more in (late, ahead))
+        recorder.message("/effector/speed", speed.type_name, qos_profiles(speed), data, received, stamp)
     recorder.close()
     return path.read_bytes()
 
@@ -141,16 +149,8 @@ def test_ros_tools_read_a_record(tmp_path: Path) -> None:
 
 def test_times_of_a_stepped_arm_are_those_of_the_machine(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
-    recorder = Recorder(path, 0, 10**18)
     step = InjectedFault(STEP, NO_TARGET, 5.0, 5.0, ahead=-1000.5)
-    recorder.event(FAULTS, 5 * 10**9, step._asdict() | {"namespace": "/"})
-    data = serialize_message(Float64(data=1.5))
-    for second in range(10):
-        sent = second * 10**9
-        stamp = sent - (1_000_500_000_000 if second > 5 else 0)
-        type_name = topics.EFFECTOR_SPEED.type_name
-        recorder.message("/effector/speed", type_name, "", data, sent + 2_000_000, stamp)
-    recorder.close()
+    recorded(path, step, seconds=10, ahead=lambda second: -1000.5 if second > 5 else 0.0)
     speeds = load(path).stream(topics.EFFECTOR_SPEED)
     assert [speed.sent for speed in speeds] == pytest.approx(range(10), abs=1e-6)
 
@@ -159,16 +159,7 @@ def overloads_of(
     path: Path, lateness: float, *events: Life | InjectedFault | Condition
 ) -> list[tuple[float, float]]:
     """Record a speed each second, the one of second 10 late by ``lateness`` [s]; return the overloads."""
-    recorder = Recorder(path, 0, 10**18)
-    for event in events:
-        topic = PROCESSES if isinstance(event, Life) else FAULTS
-        recorder.event(topic, 1, event._asdict() | {"namespace": "/"})
-    data = serialize_message(Float64(data=1.5))
-    for second in range(20):
-        sent = second * 10**9
-        received = sent + (int(lateness * 1e9) if second == 10 else 2_000_000)
-        recorder.message("/effector/speed", topics.EFFECTOR_SPEED.type_name, "", data, received, sent)
-    recorder.close()
+    recorded(path, *events, late=lambda second: lateness if second == 10 else 0.002)
     found = (each for each in load(path).conditions if each.kind == OVERLOAD)
     return [(round(each.begin, 6), round(each.end, 6)) for each in found]
 
@@ -273,13 +264,6 @@ def test_whole_part_of_a_record_without_an_end_is_judged(tmp_path: Path, judge: 
     judged = judge(record)
     assert judged.code == 0, judged.errors
     assert judged.output.startswith(f"{record} has no end: its 21 whole messages of 19.0 s are read\n")
-
-
-def test_other_file_is_refused_in_one_line(tmp_path: Path, judge: Judge) -> None:
-    record = tmp_path / "letter.txt"
-    record.write_text("Dear monkey,\nplease stop.\n")
-    judged = judge(record)
-    assert (judged.code, judged.errors) == (1, f"{record} is no MCAP file\n")
 
 
 def test_missing_file_is_refused_in_one_line(tmp_path: Path, judge: Judge) -> None:
