@@ -25,6 +25,7 @@ from functools import cache, partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+from unittest import mock
 
 import ros_yaml
 
@@ -135,7 +136,7 @@ class Testbed:
             for arm in self.arms:
                 arm_environment = {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(arm.domain)}
                 arm.parameters = self.parameters_of(arm.namespace)
-                with _environment(environment | arm_environment | arm.clock.environment()):
+                with mock.patch.dict(os.environ, environment | arm_environment | arm.clock.environment()):
                     self.start(arm, with_parameters(parameters, arm.parameters))
                 arm.environment()
                 # One arm after the other: starting together would take each of them too long.
@@ -329,15 +330,3 @@ def _lines(process: subprocess.Popen[str]) -> queue.Queue[str | None]:
 
     threading.Thread(target=read, daemon=True).start()
     return lines
-
-
-@contextmanager
-def _environment(changes: Mapping[str, str]) -> Iterator[None]:
-    """Change the environment of this process until the end of the `with`."""
-    before = dict(os.environ)
-    os.environ.update(changes)
-    try:
-        yield
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
