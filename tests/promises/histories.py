@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -24,6 +24,36 @@ RATES: dict[str, float] = {
     "operator_presence": 2.0,
     "engines/state": 10.0,
 }
+
+
+SHORT_NAMES = {
+    "heartbeats": "operator_heartbeat",
+    "presences": "operator_presence",
+    "commands": "engines",
+    "conclusions": "operator_activity",
+    "states": "engines/state",
+    "positions": "effector/position",
+    "speeds": "effector/speed",
+    "health": "/diagnostics",
+}
+
+
+def samples(messages: Iterable[tuple[float, Any]], delay: float = 0.0) -> list[Sample]:
+    """Return messages in the order of sending, each received ``delay`` [s] after it was sent."""
+    return sorted((Sample(at, at + delay, value) for at, value in messages), key=lambda each: each.sent)
+
+
+def history(
+    *,
+    end: float = 40.0,
+    lives: Sequence[Life] = (),
+    faults: Iterable[InjectedFault | Condition] = (),
+    delay: float = 0.0,
+    **messages: Iterable[tuple[float, Any]],
+) -> History:
+    """Return a history with these messages, by the names of their topics or by short names."""
+    streams = {SHORT_NAMES.get(name, name): samples(items, delay) for name, items in messages.items()}
+    return faulty(History(end, streams, [*lives]), *faults)
 
 
 def _times(rate: float) -> list[float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 import pytest
 
@@ -21,10 +21,11 @@ from tests.promises.history import (
     History,
     InjectedFault,
     Life,
-    Sample,
 )
 from tests.promises.promises import CHECKERS
 from tests.promises.text_report import text
+
+from . import histories
 
 LIVES = [
     Life(SWITCH, 11, 0.0, None),
@@ -38,16 +39,11 @@ FAULTS = [
 ]
 
 
-def history(**streams: list[tuple[float, Any]]) -> History:
-    names = {"beats": "operator_heartbeat", "states": "engines/state", "commands": "engines"}
-    samples = {
-        names.get(name, name): [Sample(at, at, it) for at, it in pairs] for name, pairs in streams.items()
-    }
-    return History(40.0, samples, LIVES, FAULTS)
+history = partial(histories.history, lives=LIVES, faults=FAULTS)
 
 
 STILL_ON = history(
-    beats=[(4.0, True), (5.0, True)],
+    heartbeats=[(4.0, True), (5.0, True)],
     operator_presence=[(4.5, 0.0), (5.0, 0.0)],
     operator_activity=[(5.0, ALIVE), (8.0, MISSED), (11.0, MISSED), (15.0, MISSED), (18.0, MISSED)],
     states=[*((n / 10, ON) for n in range(41, 210)), (21.0, OFF)],
@@ -64,7 +60,7 @@ def test_report_on_engines_that_stay_on_says_who_had_to_act() -> None:
         "the last one was due at 21.00 s; turn_off came at 21.00 s",
         "engine_controller (12) sent its last on at 20.90 s, the drive kept it (injected); "
         "until 15.45 s, the last presence had come at 5.00 s",
-        "injected: kill of operator_watchdog at 11.50 s, stuck_drive of (no target) at 5.00 s",
+        "injected: stuck_drive of (no target) at 5.00 s, kill of operator_watchdog at 11.50 s",
     ]
     shown = text([found], STILL_ON).splitlines()
     assert "    dead_mans_switch (11) sent its last heartbeat at 5.00 s" in shown
@@ -89,7 +85,7 @@ def test_report_names_what_the_watchdog_concluded_late_and_a_stranger(
         STILL_ON,
         lives=LIVES[:3],
         faults=[InjectedFault(FALSE_PRESENCE, NO_TARGET, 5.0, 30.0)],
-        streams={**STILL_ON.streams, "operator_activity": [Sample(at, at, it) for at, it in activity]},
+        streams={**STILL_ON.streams, "operator_activity": histories.samples(activity)},
     )
     _, watchdog, controller, *_ = account(slow, "S1", Evidence(15.45, "engines still on"))
 
@@ -107,7 +103,7 @@ def test_report_on_another_promise_tells_what_was_said_last() -> None:
         "operator_watchdog (14), the successor since 12.00 s, was heard last at 5.00 s, never again",
         "last messages before: operator_heartbeat at 5.00 s, operator_presence at 5.00 s, "
         "engines/state on at 13.00 s",
-        "injected: kill of operator_watchdog at 11.50 s, stuck_drive of (no target) at 5.00 s",
+        "injected: stuck_drive of (no target) at 5.00 s, kill of operator_watchdog at 11.50 s",
     ]
 
 
@@ -130,7 +126,7 @@ def test_report_tells_of_the_program_that_a_violation_is_about(text: str, progra
 
 def test_report_counts_the_strikes_before_a_return() -> None:
     activity = [(1.0, MISSED), (2.0, INCAPACITATED), (4.0, MISSED), (5.0, ALIVE), (8.0, MISSED)]
-    seen = {"operator_activity": [Sample(at, at, it) for at, it in activity]}
+    seen = {"operator_activity": histories.samples(activity)}
     lasting = replace(STILL_ON, lives=LIVES[:3], streams={**STILL_ON.streams, **seen})
     assert account(lasting, "S1", Evidence(15.45, "engines still on"))[1] == (
         "operator_watchdog (13) counted 2 of 3 strikes until 15.45 s, at 4.0, 8.0 s, "

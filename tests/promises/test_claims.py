@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -18,26 +19,16 @@ from tests.promises.history import (
     SWITCH,
     WATCHDOG,
     Condition,
-    History,
     InjectedFault,
     Life,
-    Sample,
 )
 
-from .histories import faulty
+from . import histories
 
 HERE, THERE = "host", "another host"
 
 
-def history(
-    *events: InjectedFault | Condition, lives: tuple[Life, ...] = (), **streams: list[tuple[float, Any]]
-) -> History:
-    names = {"states": "engines/state", "commands": "engines", "beats": "operator_heartbeat"}
-    samples = {
-        names.get(name, name): [Sample(at, at, value) for at, value in pairs]
-        for name, pairs in streams.items()
-    }
-    return faulty(History(60.0, samples, [*lives]), *events)
+history = partial(histories.history, end=60.0)
 
 
 def repeated(value: Any, begin: float, end: float, step: float = 0.1) -> list[tuple[float, Any]]:
@@ -102,7 +93,7 @@ def test_drive_that_runs_on_is_found(
     ],
 )
 def test_drive_that_was_away_may_report_a_time_later(event: InjectedFault | Condition, found: bool) -> None:
-    judged = history(event, states=ON_AND_OFF, driven_time=driven(5.4, 10.3))
+    judged = history(faults=[event], states=ON_AND_OFF, driven_time=driven(5.4, 10.3))
     assert bool(texts(claims.drive_runs_by_a_young_on(judged, effects(judged)))) is found
 
 
@@ -124,7 +115,7 @@ def test_drive_may_not_know_a_new_controller_that_says_off(began: float, end: fl
 def test_drive_may_not_know_a_rival_that_has_come_just_now(began: float, found: bool) -> None:
     rival = InjectedFault(RIVAL, NO_TARGET, began, 20.0)
     both = sorted([*repeated(ON, 5.0, 20.0), *repeated(OFF, 10.0, 20.0)])
-    judged = history(rival, states=both, driven_time=driven(5.4, 10.35))
+    judged = history(faults=[rival], states=both, driven_time=driven(5.4, 10.35))
     assert bool(texts(claims.drive_runs_by_a_young_on(judged, effects(judged)))) is found
 
 
@@ -150,7 +141,7 @@ IDLE = repeated(OFF, 0.0, 40.0)
     ],
 )
 def test_present_operator_who_is_not_obeyed_is_found(at: float, extra: dict[str, Any], found: bool) -> None:
-    judged = history(**{"beats": BEATS, "states": IDLE, "commands": [(at, TURN_ON)], **extra})
+    judged = history(**{"heartbeats": BEATS, "states": IDLE, "commands": [(at, TURN_ON)], **extra})
     text = "a turn_on of a present operator turned nothing on, and the operator was not reported"
     assert texts(claims.present_operator_is_obeyed(judged, effects(judged))) == [text] * found
 
@@ -158,7 +149,7 @@ def test_present_operator_who_is_not_obeyed_is_found(at: float, extra: dict[str,
 @pytest.mark.parametrize("program", [SWITCH, WATCHDOG, CONTROLLER])
 def test_present_operator_need_not_be_obeyed_by_the_dead(program: str) -> None:
     killed = InjectedFault("kill", program, 19.0, 19.0)
-    judged = history(killed, beats=BEATS, states=IDLE, commands=[(20.0, TURN_ON)])
+    judged = history(faults=[killed], heartbeats=BEATS, states=IDLE, commands=[(20.0, TURN_ON)])
     assert not texts(claims.present_operator_is_obeyed(judged, effects(judged)))
 
 
@@ -185,7 +176,7 @@ def silences(*lasting: float) -> list[tuple[float, Any]]:
     ],
 )
 def test_strikes_that_turn_nothing_off_are_found(lasting: tuple[float, ...], found: bool) -> None:
-    judged = history(beats=silences(*lasting), states=repeated(ON, 0.0, 60.0))
+    judged = history(heartbeats=silences(*lasting), states=repeated(ON, 0.0, 60.0))
     assert bool(texts(claims.last_strike_stops(judged, effects(judged)))) is found
 
 
@@ -202,8 +193,8 @@ def test_strikes_that_turn_nothing_off_are_found(lasting: tuple[float, ...], fou
 def test_strikes_count_for_a_watchdog_that_has_seen_them(
     extra: dict[str, Any], lives: tuple[Life, ...], faults: tuple[InjectedFault, ...]
 ) -> None:
-    given = {"beats": silences(4.2, 4.2, 4.2), "states": repeated(ON, 0.0, 60.0), **extra}
-    judged = history(*faults, lives=lives, **given)
+    given = {"heartbeats": silences(4.2, 4.2, 4.2), "states": repeated(ON, 0.0, 60.0), **extra}
+    judged = history(faults=faults, lives=lives, **given)
     assert not texts(claims.last_strike_stops(judged, effects(judged)))
 
 
@@ -226,7 +217,7 @@ def test_strikes_count_for_a_watchdog_that_has_seen_them(
 def test_process_that_ends_without_a_cause_is_found(
     event: InjectedFault | Condition, ended: float, found: bool
 ) -> None:
-    judged = history(event, lives=(Life("velocity", 7, 0.0, ended),))
+    judged = history(faults=[event], lives=(Life("velocity", 7, 0.0, ended),))
     expected = ["process 7 of velocity ended without a cause"] * found
     assert texts(claims.ends_have_causes(judged, effects(judged))) == expected
 

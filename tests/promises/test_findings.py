@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -24,41 +23,15 @@ from tests.promises.history import (
     SWITCH,
     WATCHDOG,
     Condition,
-    History,
     InjectedFault,
     Life,
-    Sample,
 )
 from tests.promises.marks import STEP
 from tests.promises.promises import CHECKERS
 
-from .histories import faulty
+from . import histories
 
-TOPICS = {
-    "heartbeats": "operator_heartbeat",
-    "presences": "operator_presence",
-    "commands": "engines",
-    "conclusions": "operator_activity",
-    "states": "engines/state",
-    "positions": "effector/position",
-    "speeds": "effector/speed",
-    "health": "/diagnostics",
-}
-
-
-def history(
-    *,
-    end: float = 40.0,
-    lives: Sequence[Life] = (),
-    faults: Iterable[InjectedFault | Condition] = (),
-    **messages: Iterable[tuple[float, Any]],
-) -> History:
-    """Return a history with these messages, each received 0.125 s after it was sent."""
-    streams = {
-        TOPICS.get(name, name): sorted(Sample(at, at + 0.125, value) for at, value in items)
-        for name, items in messages.items()
-    }
-    return faulty(History(end, streams, [*lives]), *faults)
+history = partial(histories.history, delay=0.125)
 
 
 def steps(begin: float, end: float, step: float = 0.25, value: Any = True) -> list[tuple[float, Any]]:

@@ -6,9 +6,11 @@ import pytest
 
 from interfaces.topics import OFF, ON
 from tests.promises.findings import Evidence, Finding
-from tests.promises.history import CONTROLLER, KINEMATICS, Condition, History, InjectedFault, Sample
+from tests.promises.history import CONTROLLER, KINEMATICS, Condition, History, InjectedFault
 from tests.promises.planned import planned, with_planned
 from tests.promises.promises import checked
+
+from .histories import samples
 
 END = 300.0
 DAY = 50.0
@@ -17,20 +19,16 @@ AWAKE = 30.0
 SILENCES = [Condition("silence", DAY * n + AWAKE, DAY * (n + 1)) for n in range(round(END / DAY))]
 
 
-def samples(values: list[tuple[float, object]]) -> list[Sample]:
-    return [Sample(at, at, value) for at, value in values]
-
-
 def days(*, lets_go: bool, faults: list[InjectedFault] | None = None, driven: bool = False) -> History:
     """Return a record in which the engines turn off 10 s after a release that the switch shows."""
     times = [n / 10 for n in range(round(10 * END))]
     beats = [(at, True) for at in times if not lets_go or at % DAY < AWAKE]
     states = [(at, ON if not lets_go or 1.0 < at % DAY < AWAKE + 9.9 else OFF) for at in times]
-    streams = {"operator_heartbeat": samples([*beats]), "engines/state": samples([*states])}
+    streams = {"operator_heartbeat": samples(beats), "engines/state": samples(states)}
     if driven:
-        streams["effector/position"] = samples([(at, (at, 0.0)) for at in times])
-        streams["l1"] = samples([(at, at) for at in times if at < 69.0])
-        streams["driven_time"] = samples([(at, (at, "robot")) for at in times])
+        streams["effector/position"] = samples((at, (at, 0.0)) for at in times)
+        streams["l1"] = samples((at, at) for at in times if at < 69.0)
+        streams["driven_time"] = samples((at, (at, "robot")) for at in times)
     return History(END, streams, faults=faults or [], conditions=SILENCES)
 
 
@@ -52,9 +50,8 @@ def test_switch_that_never_lets_go_leaves_s1_without_its_cases() -> None:
 
 def test_engines_that_never_turn_on_leave_s3_without_its_cases() -> None:
     history = days(lets_go=True)
-    history.streams["engines/state"] = samples(
-        [(each.sent, OFF) for each in history.streams["engines/state"]]
-    )
+    states = history.streams["engines/state"]
+    history.streams["engines/state"] = samples((each.sent, OFF) for each in states)
     assert {*too_few(history)} == {"S3"}
 
 
