@@ -12,11 +12,7 @@ RECORDED = "e4237b01f003cc9551fbe4edc65c58ae90ed4e16770053839dc4b151f9e408fa"
 """The digest of seed 7 on each Python and release of ROS 2. A change of the model changes it."""
 
 
-def test_a_seed_gives_the_recorded_run_on_each_python_and_release() -> None:
-    assert busy.digest(7) == RECORDED
-
-
-def test_a_seed_gives_the_same_run_in_each_interpreter() -> None:
+def test_a_seed_gives_the_recorded_run_in_each_interpreter() -> None:
     def digests(hash_seed: str) -> list[str]:
         environment = os.environ | {"PYTHONHASHSEED": hash_seed}
         command = [sys.executable, "-m", busy.__name__]
@@ -26,5 +22,5 @@ def test_a_seed_gives_the_same_run_in_each_interpreter() -> None:
 
     one, other = digests("1"), digests("2")
     assert one == other
+    assert one[0] == busy.digest(7) == RECORDED
     assert one[0] != one[1]
-    assert busy.digest(7) == one[0]

@@ -132,24 +132,16 @@ def test_samples_of_a_lost_topic_never_arrive(simulation: Simulation, start: Sta
 
 
 @pytest.mark.simulation(seed=1)
-def test_best_effort_samples_are_lost_at_the_given_rate(simulation: Simulation, start: Start) -> None:
-    talker, talking, listener, _ = start(BEST_EFFORT)
+@pytest.mark.parametrize("offered", [BEST_EFFORT, 1000], ids=["best effort", "reliable"])
+def test_a_best_effort_reader_loses_samples_at_the_given_rate(
+    simulation: Simulation, start: Start, offered: QoSProfile | int
+) -> None:
+    talker, talking, listener, _ = start(offered, BEST_EFFORT)
     simulation.network.loss = 0.2
     publish(simulation, talking, talker, *range(1000))
     simulation.run(10.0)
     assert len(listener.received) == pytest.approx(800, abs=40)
     assert listener.received == sorted(listener.received)
-
-
-@pytest.mark.simulation(seed=1)
-def test_a_best_effort_reader_of_a_reliable_writer_loses_samples(
-    simulation: Simulation, start: Start
-) -> None:
-    talker, talking, listener, _ = start(1000, BEST_EFFORT)
-    simulation.network.loss = 0.2
-    publish(simulation, talking, talker, *range(1000))
-    simulation.run(10.0)
-    assert len(listener.received) == pytest.approx(800, abs=40)
 
 
 @pytest.mark.simulation(seed=1, network=Network(latency=EXACT, retransmission=Delay(0.05, 0.05)))
