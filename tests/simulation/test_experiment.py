@@ -23,7 +23,7 @@ from tests.chaos import schedule
 from tests.chaos.schedule import AWAKE, DAY, PlannedFault
 from tests.chaos.schedule_file import Experiment
 from tests.chaos.testbed import SCENARIO, sources
-from tests.promises.history import ALL, NO_TARGET, OPERATOR, SWITCH
+from tests.promises.history import ALL, CONTROLLER, NO_TARGET, OPERATOR, SWITCH
 from tests.simulation import arm, people, plan
 from tests.simulation.bugs import Bug, planted
 from tests.simulation.faults import BAD_LINE, FAULT_KINDS
@@ -83,39 +83,24 @@ def test_a_quiet_experiment_has_output_from_every_program() -> None:
         assert outcome.history.output(program), program
 
 
-def test_equal_experiments_give_equal_records_in_any_interpreter() -> None:
-    program = (
-        "from tests.simulation import plan; from tests.simulation.outcome import simulate; "
-        f"print(simulate(plan.experiment('equal', {LENGTH}, 1.0, list(plan.FAULT_KINDS))).digest)"
-    )
-    runs = [
-        subprocess.Popen(
-            [sys.executable, "-c", program],
-            cwd=ROOT,
-            env={**os.environ, "PYTHONHASHSEED": seed},
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        for seed in ("1", "2")
-    ]
-    digests = [run.communicate()[0] for run in runs]
-    assert digests[0]
-    assert digests[0] == digests[1]
-
-
-def test_one_worker_or_two_give_equal_records() -> None:
+def test_equal_experiments_give_equal_records_in_any_interpreter_by_one_worker_or_two() -> None:
     program = (
         "import os; from tests.simulation import plan; from tests.simulation.workers import summaries; "
         "os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:{number}]); "
-        "every = [plan.experiment(str(seed), 16.0, 1.0, list(plan.FAULT_KINDS)) for seed in range(2)]; "
+        f"every = [plan.experiment(str(seed), {LENGTH}, 1.0, list(plan.FAULT_KINDS)) for seed in range(2)]; "
         "print([each.digest for each in summaries(every)])"
     )
-    runs = [
-        subprocess.run([sys.executable, "-c", program.format(number=number)], cwd=ROOT, capture_output=True)
-        for number in (1, 2)
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", program.replace("{number}", number)],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONHASHSEED": number},
+            capture_output=True,
+        ).stdout
+        for number in ("1", "2")
     ]
-    assert runs[0].stdout.count(b"'") == 4
-    assert runs[0].stdout == runs[1].stdout
+    assert outputs[0].count(b"'") == 4
+    assert outputs[0] == outputs[1]
 
 
 def test_another_seed_gives_another_record() -> None:
@@ -132,20 +117,14 @@ BRIEF = {
 ASLEEP = 4.0  # s
 
 
-def with_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
-    broken = [
-        Program(each.name, "tests.simulation.deaf_controller", ())
-        if each.name == "engine_controller"
-        else each
-        for each in arm.PROGRAMS
-    ]
-    monkeypatch.setattr(arm, "PROGRAMS", tuple(broken))
+DEAF = Bug(CONTROLLER, "10.0, (1.0, 10.0), ", "3600.0, (1.0, 3600.0), ")
+"""The controller does not turn off on its own when it hears of no operator."""
 
 
-def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) -> None:
-    with_a_bug(monkeypatch)
+def test_a_bug_of_a_service_violates_a_promise() -> None:
     kills = [PlannedFault(ASLEEP + 1.0 + n, "kill", "operator_watchdog") for n in range(11)]
-    assert "S1" in violations(simulate(Experiment("bug", ASLEEP + 12.0, BRIEF, kills)))
+    with planted(DEAF):
+        assert "S1" in violations(simulate(Experiment("bug", ASLEEP + 12.0, BRIEF, kills)))
 
 
 def test_a_switch_that_never_lets_go_violates_s1() -> None:
