@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -162,9 +163,16 @@ def test_a_timeline_has_faults_calls_and_the_last_words_of_a_program_that_prints
     ]
 
 
-def test_the_smallest_part_that_fails_is_found() -> None:
-    assert minimal(list(range(100)), lambda part: {3, 77} <= set(part)) == [3, 77]
-    assert minimal([1, 2, 3], lambda part: True) == []
+@pytest.mark.parametrize("needed", [[], [0], [3], [2, 7], [0, 5, 9], [*range(10)]])
+def test_the_smallest_part_that_fails_is_found(needed: list[int]) -> None:
+    tried: list[Sequence[int]] = []
+
+    def fails(part: Sequence[int]) -> bool:
+        tried.append(part)
+        return {*needed} <= {*part}
+
+    assert [*minimal(range(10), fails)] == needed
+    assert len(tried) < 100
 
 
 TEST = """
