@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import atexit
 import gc
 import os
@@ -163,6 +164,31 @@ def test_each_thread_has_its_own_identity(simulation: Simulation) -> None:
     assert names == ["MainThread", "other"] * 2
     assert len(identities) == 4
     assert not identities & threading._active.keys()  # type: ignore[attr-defined]
+
+
+def test_a_real_thread_keeps_its_identity_and_its_time(simulation: Simulation) -> None:
+    """It is in no simulated process, whichever runs at that moment."""
+    asked, answered = _thread.allocate_lock(), _thread.allocate_lock()
+    asked.acquire()
+    answered.acquire()
+    seen: list[object] = []
+
+    def answer() -> None:
+        asked.acquire()
+        begin = time.monotonic()
+        waited = threading.Event().wait(0.05)
+        seen.extend([threading.get_ident() == _thread.get_ident(), waited, time.monotonic() - begin >= 0.05])
+        answered.release()
+
+    _thread.start_new_thread(answer, ())
+
+    def ask() -> None:
+        asked.release()
+        answered.acquire()  # a real wait, in which the simulated process stays the current one
+
+    simulation.start(ask)
+    simulation.run(1.0)
+    assert seen == [True, False, True]
 
 
 def test_an_error_in_a_second_thread_does_not_end_the_process(simulation: Simulation) -> None:
