@@ -8,7 +8,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from html import escape
 
+from interfaces.plain_text import plain
 from tests.promises.findings import VIOLATED, Finding, percentile
 from tests.promises.history import (
     ALL,
@@ -22,7 +24,6 @@ from tests.promises.history import (
     running,
     target_name,
 )
-from tests.promises.markup import plain_html
 
 LEFT, ROW, BAR = 150, 26, 14  # px: names of rows, rows, bars
 PER_SECOND, PER_SECOND_LONG, NARROWEST = 8.0, 3.0, 1000.0  # px of a timeline
@@ -54,6 +55,11 @@ svg .card { fill: var(--card); stroke: var(--line); }
 SUPERVISORD = "supervisord"
 ROWS = ("operator", "engines", target_name(NO_TARGET), SUPERVISORD)
 """The rows above those of the programs."""
+
+
+def plain_html(text: str) -> str:
+    """Return a text of others in the same way as :func:`plain`, for HTML and SVG."""
+    return escape(plain(text))
 
 
 def framed(picture: str, width: float, height: float, title: str) -> str:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from tests.promises.account import account
-from tests.promises.charts import COLORS, LEFT, STYLE, histograms, timeline
+from tests.promises.charts import COLORS, LEFT, STYLE, histograms, plain_html, timeline
 from tests.promises.findings import HOLDS, UNKNOWN, VIOLATED, Finding, count
 from tests.promises.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
 from tests.promises.limits import DURATIONS
-from tests.promises.markup import plain_html
 from tests.promises.promises import meaning
 
 SHOWN = 10  # pieces of evidence of a promise
