@@ -25,15 +25,12 @@ import tests.benchmarks.links.{link}
 Commands = Callable[["Alternative", Sequence[Job]], list[list[str]]]
 
 
-def job_command(alternative: Alternative, job: Job) -> list[str]:
-    """Return the command of a process; its job goes to a file."""
-    file = Path(job.directory, f"{job.role}.json")
-    file.write_text(json.dumps(asdict(job)))
-    return [str(PYTHON), "-m", "tests.benchmarks.worker", str(file)]
-
-
 def processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
-    return [job_command(alternative, job) for job in jobs]
+    """Return a command for each job, which goes to a file."""
+    files = [Path(job.directory, f"{job.role}.json") for job in jobs]
+    for job, file in zip(jobs, files, strict=True):
+        file.write_text(json.dumps(asdict(job)))
+    return [[str(PYTHON), "-m", "tests.benchmarks.worker", str(file)] for file in files]
 
 
 def services(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:

@@ -36,10 +36,6 @@ def table(title: str, results: Results, figures: Mapping[str, str]) -> str:
     return "\n".join(lines)
 
 
-def _by_size(figure: str) -> dict[str, str]:
-    return {figure.format(size): heading for size, heading in SIZES.items()}
-
-
 def chain_tables(results: Results) -> str:
     """Return all tables of the arm's own chain and watchdog."""
     titles = {
@@ -58,22 +54,19 @@ def chain_tables(results: Results) -> str:
 
 
 def tables(results: Results) -> str:
-    def ordered(title: str, figure: str) -> str:
-        return table(title, results, _by_size(figure))
-
-    return "\n\n".join(
-        [
-            ordered("pipeline: latency, p50 [ms]", "pipeline.{}.p50_ms"),
-            ordered("pipeline: latency, p99 [ms]", "pipeline.{}.p99_ms"),
-            ordered("pipeline: CPU of the middle process [µs/item]", "pipeline.{}.cpu_us"),
-            ordered("pipeline: proportional set size of the middle process [MB]", "pipeline.{}.megabytes"),
-            ordered("pipeline: delivered [%]", "pipeline.{}.delivered"),
-            ordered("flood: received [items/s]", "flood.{}.per_second"),
-            ordered("flood: CPU of the subscriber [µs/item]", "flood.{}.cpu_us"),
-            table(
-                "the rest",
-                results,
-                {"start.8.seconds": "start to first item [s]", "pipeline.8.threads": "threads of the middle"},
-            ),
-        ]
-    )
+    """Return all tables of the comparison with alternatives."""
+    titles = {
+        "pipeline.{}.p50_ms": "pipeline: latency, p50 [ms]",
+        "pipeline.{}.p99_ms": "pipeline: latency, p99 [ms]",
+        "pipeline.{}.cpu_us": "pipeline: CPU of the middle process [µs/item]",
+        "pipeline.{}.megabytes": "pipeline: proportional set size of the middle process [MB]",
+        "pipeline.{}.delivered": "pipeline: delivered [%]",
+        "flood.{}.per_second": "flood: received [items/s]",
+        "flood.{}.cpu_us": "flood: CPU of the subscriber [µs/item]",
+    }
+    by_size = [
+        table(title, results, {figure.format(size): heading for size, heading in SIZES.items()})
+        for figure, title in titles.items()
+    ]
+    rest = {"start.8.seconds": "start to first item [s]", "pipeline.8.threads": "threads of the middle"}
+    return "\n\n".join([*by_size, table("the rest", results, rest)])
