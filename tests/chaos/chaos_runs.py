@@ -6,8 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from deploy.supervision import processes
 from tests.chaos.arm import file_suffix
+from tests.chaos.partition import missing
 from tests.environment import user_environment
 from tests.promises import observations
 from tests.promises.findings import Finding
@@ -15,6 +18,12 @@ from tests.promises.history import History
 from tests.promises.promises import checked
 
 TIMEOUT = 150.0  # s
+
+
+def need_two_hosts() -> None:
+    """Skip a test where this machine cannot have hosts of its own."""
+    if reason := missing():
+        pytest.skip(f"platform: {reason}")
 
 
 class ChaosRun:

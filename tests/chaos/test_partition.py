@@ -17,15 +17,14 @@ from tests.promises.history import History, InjectedFault, between
 from tests.promises.lateness import REDISCOVERY
 from tests.promises.promises import CHECKERS
 
-from .chaos_runs import chaos_run
+from .chaos_runs import chaos_run, need_two_hosts
 
 pytestmark = [pytest.mark.timed, pytest.mark.timeout(120)]
 
 
 @pytest.fixture(scope="module")
 def history(tmp_path_factory: pytest.TempPathFactory) -> History:
-    if reason := missing():
-        pytest.skip(reason)
+    need_two_hosts()
     return chaos_run(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
 
 
@@ -64,9 +63,10 @@ def test_no_promise_is_violated(history: History, promise: str) -> None:
 def test_bad_line_violates_no_promise_and_engines_stay_on(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
-    if reason := missing() or missing("bad_line"):
+    need_two_hosts()
+    if reason := missing("bad_line"):
         # An error of the kernel; an error in the use of tc would read differently.
-        assert "Specified qdisc kind is unknown" in reason or reason == missing()
+        assert "Specified qdisc kind is unknown" in reason
         pytest.skip(f"platform: {reason}")
     bad = chaos_run(tmp_path_factory.mktemp("bad_line"), "--scenario", "bad_line")
     (fault,) = (fault for fault in bad.history.faults if fault.kind == "bad_line")
@@ -89,8 +89,7 @@ with ExitStack() as stack:
 
 
 def test_next_start_cleans_up_after_a_killed_chaos_monkey(tmp_path: Path) -> None:
-    if reason := missing():
-        pytest.skip(reason)
+    need_two_hosts()
     command = [sys.executable, "-c", PREPARED, str(tmp_path)]
     with subprocess.Popen(command, cwd=processes.ROOT, stdout=subprocess.PIPE) as monkey:
         try:

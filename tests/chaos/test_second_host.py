@@ -7,19 +7,17 @@ from itertools import pairwise
 import pytest
 
 from interfaces import topics
-from tests.chaos.partition import missing
 from tests.promises.findings import HOLDS
 from tests.promises.history import History, between
 
-from .chaos_runs import ChaosRun, chaos_run
+from .chaos_runs import ChaosRun, chaos_run, need_two_hosts
 
 pytestmark = [pytest.mark.timed, pytest.mark.timeout(150)]
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> ChaosRun:
-    if reason := missing():
-        pytest.skip(f"platform: {reason}")
+    need_two_hosts()
     return chaos_run(tmp_path_factory.mktemp("second_host"), "--scenario", "second_host")
 
 
