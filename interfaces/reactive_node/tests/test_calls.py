@@ -118,17 +118,6 @@ def test_abandoned_call_emits_nothing(
     assert responses == []
 
 
-def test_call_completes_with_node(node: ReactiveNode) -> None:
-    completed: list[bool] = []
-    node.create_call(SetBool, "nowhere")(SetBool.Request()).subscribe(
-        on_completed=lambda: completed.append(True)
-    )
-
-    node.destroy_node()
-
-    assert completed == [True]
-
-
 def test_calls_that_wait_share_one_timer(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
     timers = len([*node.timers])
     responses: list[Any] = []

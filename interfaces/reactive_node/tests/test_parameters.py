@@ -123,13 +123,3 @@ def test_undeclared_parameter_is_error_of_observable(node: ReactiveNode) -> None
     node.set_parameters([Parameter("gain", value=2.0)])
 
     assert [type(error) for error in errors] == [ParameterNotDeclaredException]
-
-
-def test_parameter_observable_completes_with_node(node: ReactiveNode) -> None:
-    node.declare_parameter("gain", 1.0)
-    completed: list[bool] = []
-    node.create_parameter_observable("gain").subscribe(on_completed=lambda: completed.append(True))
-
-    node.destroy_node()
-
-    assert completed == [True]

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import gc
-import threading
 import weakref
 from collections.abc import Callable
 from typing import Any
@@ -18,19 +17,6 @@ from std_srvs.srv import SetBool
 
 from reactive_node import ReactiveNode
 from reactive_node.testing import SpinFor, SpinUntil
-
-
-def test_observable_is_published(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
-    numbers: Subject[float] = Subject()
-    received: list[float] = []
-    peer.create_subscription(Float64, "numbers", lambda message: received.append(message.data), 10)
-    node.publish_observable(numbers.map(lambda number: Float64(data=number)), Float64, "numbers")
-
-    spin_until(lambda: node.count_subscribers("numbers") == 1)
-    spin_until(lambda: peer.count_publishers("numbers") == 1)
-    spin_until(lambda: any(p.get_subscription_count() for p in node.publishers if p.topic_name == "/numbers"))
-    numbers.on_next(1.5)
-    spin_until(lambda: received == [1.5])
 
 
 def test_message_is_made_of_each_item_unless_there_is_none(
@@ -156,19 +142,6 @@ def test_ten_messages_wait_unless_the_user_wants_otherwise(node: ReactiveNode) -
     assert (depths["/heard"], depths["/said"]) == (10, 10)
 
 
-def test_recipe_runs_on_scheduler_of_node(node: ReactiveNode, spin_until: SpinUntil) -> None:
-    threads: list[int] = []
-
-    def message(number: int) -> Float64:
-        threads.append(threading.get_ident())
-        return Float64(data=float(number))
-
-    node.publish_observable(rx.interval(0.001).map(message), Float64, "numbers")
-    spin_until(lambda: len(threads) >= 3)
-
-    assert set(threads) == {threading.get_ident()}
-
-
 @pytest.mark.parametrize(
     "recipe",
     [
@@ -195,14 +168,3 @@ def test_message_of_wrong_type_is_raised_by_spin(
 
     with pytest.raises(TypeError):
         spin_until(lambda: False)
-
-
-def test_end_of_node_ends_publishing(node: ReactiveNode) -> None:
-    numbers: Subject[Float64] = Subject()
-    node.publish_observable(numbers, Float64, "numbers")
-    assert numbers.observers
-
-    node.destroy_node()
-
-    assert not numbers.observers
-    numbers.on_next(Float64(data=1.0))

@@ -55,15 +55,6 @@ def test_recipe_answers_requests(node: ReactiveNode, caller: Caller) -> None:
     assert caller.response(False).success is False
 
 
-def test_recipe_remembers_earlier_requests(node: ReactiveNode, caller: Caller) -> None:
-    def count(requests: Observable[SetBool.Request]) -> Observable[Answer]:
-        return requests.map_indexed(lambda request, index: answered(request, f"request {index}"))
-
-    node.serve_recipe(count, SetBool, "switch")
-
-    assert [caller.response(True).message for _ in range(3)] == ["request 0", "request 1", "request 2"]
-
-
 def test_recipe_runs_by_clock_of_node(node: ReactiveNode, caller: Caller) -> None:
     threads: list[int] = []
 
@@ -74,29 +65,6 @@ def test_recipe_runs_by_clock_of_node(node: ReactiveNode, caller: Caller) -> Non
 
     assert caller.response(True).success is True
     assert threads == [threading.get_ident()]
-
-
-def test_requests_may_be_answered_in_any_order(
-    node: ReactiveNode, caller: Caller, spin_until: SpinUntil
-) -> None:
-    gates: dict[bool, Subject[str]] = {True: Subject(), False: Subject()}
-    waiting: list[bool] = []
-
-    def answer(request: SetBool.Request) -> Observable[Answer]:
-        waiting.append(request.data)
-        return gates[request.data].map(lambda message: answered(request, message))
-
-    node.serve_recipe(lambda requests: requests.flat_map(answer), SetBool, "switch")
-    first, second = caller.call(True), caller.call(False)
-    spin_until(lambda: waiting == [True, False])
-
-    gates[False].on_next("second")
-    spin_until(second.done)
-    assert not first.done()
-    gates[True].on_next("first")
-    spin_until(first.done)
-
-    assert (first.result().message, second.result().message) == ("first", "second")
 
 
 def test_equal_requests_of_two_clients_are_distinguished(
@@ -120,20 +88,6 @@ def test_equal_requests_of_two_clients_are_distinguished(
     spin_until(first.done)
 
     assert (first.result().message, second.result().message) == ("first", "second")
-
-
-def test_request_without_answer_blocks_no_other(
-    node: ReactiveNode, caller: Caller, spin_for: SpinFor
-) -> None:
-    node.serve_recipe(
-        lambda requests: requests.filter(lambda request: request.data).map(answered), SetBool, "switch"
-    )
-
-    ignored = caller.call(False)
-    assert caller.response(True).success is True
-    spin_for(0.05)
-
-    assert not ignored.done()
 
 
 def test_answer_of_another_thread_wakes_sleeping_executor(
@@ -181,22 +135,6 @@ def test_recipe_does_not_run_in_parallel_with_callbacks_of_node(context: Context
     peer.destroy_node()
 
     assert (ran.is_set(), overlapped) == (True, [False])
-
-
-def test_recipe_may_call_another_service(node: ReactiveNode, peer: Node, caller: Caller) -> None:
-    def serve(request: Any, response: Any) -> Any:
-        response.message = "from behind"
-        return response
-
-    peer.create_service(SetBool, "behind", serve)
-    call = node.create_call(SetBool, "behind")
-
-    def forward(requests: Observable[SetBool.Request]) -> Observable[Answer]:
-        return requests.flat_map(lambda request: call(request).map(lambda response: (request, response)))
-
-    node.serve_recipe(forward, SetBool, "switch")
-
-    assert caller.response(True).message == "from behind"
 
 
 # Errors
@@ -257,15 +195,18 @@ def test_fault_at_start_is_raised_by_spin(node: ReactiveNode, spin_until: SpinUn
 # The end of the service
 
 
-def test_disposing_ends_service_and_recipe(node: ReactiveNode, caller: Caller, spin_until: SpinUntil) -> None:
+@pytest.mark.parametrize("end", ["service", "node"])
+def test_end_of_service_or_node_ends_recipe(
+    node: ReactiveNode, caller: Caller, spin_until: SpinUntil, end: str
+) -> None:
     ended: list[bool] = []
     service = node.serve_recipe(
         lambda requests: requests.finally_action(lambda: ended.append(True)).map(answered), SetBool, "switch"
     )
     assert caller.response(True).success is True
 
-    service.dispose()
-    service.dispose()
+    for _ in range(2):
+        service.dispose() if end == "service" else node.destroy_node()
 
     assert ended == [True]
     spin_until(lambda: not caller.client.service_is_ready())
@@ -295,15 +236,3 @@ def test_disposed_service_does_not_send_its_last_answer(
     spin_for(0.05)
 
     assert sent == []
-
-
-def test_end_of_node_ends_recipe_without_error(node: ReactiveNode, caller: Caller) -> None:
-    ended: list[bool] = []
-    node.serve_recipe(
-        lambda requests: requests.finally_action(lambda: ended.append(True)).map(answered), SetBool, "switch"
-    )
-    assert caller.response(True).success is True
-
-    node.destroy_node()
-
-    assert ended == [True]
