@@ -13,7 +13,6 @@ from rclpy.action.client import ClientGoalHandle
 from rclpy.node import Node
 from rclpy.task import Future
 from reactivex.abc import DisposableBase
-from reactivex.subject import Subject
 
 from reactive_node import ReactiveNode
 from reactive_node.actions import GoalAborted, GoalCanceled, GoalRejected, GoalUnknown
@@ -186,15 +185,6 @@ def test_goal_that_another_client_cancels_is_error_with_result(
     assert server.cancelled == [7]
 
 
-def test_rejected_goal_can_be_retried(node: ReactiveNode, server: Server, spin_until: SpinUntil) -> None:
-    server.accept = False
-
-    watch = Watch(node.create_action_call(Fibonacci, "fibonacci")(goal(7)).retry(3), node)
-    spin_until(lambda: watch.errors)
-
-    assert server.goals == [7, 7, 7]
-
-
 def test_goal_of_wrong_type_is_error(node: ReactiveNode, server: Server, spin_until: SpinUntil) -> None:
     watch = Watch(node.create_action_call(Fibonacci, "fibonacci")("no goal"), node)
     spin_until(lambda: watch.errors)
@@ -235,26 +225,16 @@ def test_disposing_cancels_goal(
     assert (watch.errors, watch.completed) == ([], False)
 
 
-def test_goal_disposed_before_its_acceptance_is_cancelled(
+def test_goal_disposed_before_its_acceptance_is_cancelled_and_forgotten(
     node: ReactiveNode, server: Server, spin_until: SpinUntil
 ) -> None:
     server.feedback = []
-    watch: Watch
-    server.on_goal = lambda: watch.subscription.dispose()
-
-    watch = Watch(node.create_action_call(Fibonacci, "fibonacci")(goal(7)), node)
-    spin_until(lambda: server.cancelled == [7])
-
-    assert watch.items == []
-
-
-def test_goal_disposed_before_its_acceptance_is_forgotten(
-    node: ReactiveNode, server: Server, spin_until: SpinUntil
-) -> None:
     watches: list[Watch] = []
     server.on_goal = lambda: watches[0].subscription.dispose()
+
     watches.append(Watch(node.create_action_call(Fibonacci, "fibonacci")(goal(7)), node))
     spin_until(lambda: server.cancelled == [7])
+    assert watches[0].items == []
 
     kept = weakref.ref(watches.pop())
 
@@ -293,20 +273,6 @@ def test_goal_that_has_ended_is_not_cancelled(
     assert cancelled == []
 
 
-def test_newer_goal_replaces_older_one(node: ReactiveNode, server: Server, spin_until: SpinUntil) -> None:
-    goals: Subject[Fibonacci.Goal] = Subject()
-    watch = Watch(goals.map(node.create_action_call(Fibonacci, "fibonacci")).switch_latest(), node)
-
-    goals.on_next(goal(7))
-    spin_until(lambda: len(watch.items) == 2)
-    goals.on_next(goal(8))
-    spin_until(lambda: server.cancelled == [7] and len(watch.items) == 4)
-    server.end(8)
-    spin_until(lambda: watch.items[-1] == result(8))
-
-    assert (server.goals, server.cancelled) == ([7, 8], [7])
-
-
 @pytest.mark.filterwarnings("ignore:failed to send response")  # with Fast DDS, the server says who has gone
 def test_end_of_node_completes_execution_and_cancels_goal(
     node: ReactiveNode, server: Server, spin_until: SpinUntil
@@ -330,16 +296,3 @@ def test_each_subscription_sends_a_goal(node: ReactiveNode, server: Server, spin
     spin_until(lambda: len(first.items) == len(second.items) == 2)
 
     assert server.goals == [7, 7]
-
-
-def test_goals_run_in_parallel(node: ReactiveNode, server: Server, spin_until: SpinUntil) -> None:
-    act = node.create_action_call(Fibonacci, "fibonacci")
-    watch = Watch(rx.of(goal(7), goal(8)).flat_map(lambda one: act(one).last()), node)
-    spin_until(lambda: len(server.ends) == 2)
-
-    server.end(8)
-    spin_until(lambda: watch.items == [result(8)])
-    server.end(7)
-    spin_until(lambda: watch.completed)
-
-    assert watch.items == [result(8), result(7)]
