@@ -8,7 +8,6 @@ import pytest
 import reactivex as rx
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from reactivex.scheduler import ImmediateScheduler
 from reactivex.subject import Subject
@@ -73,11 +72,6 @@ def readers() -> Readers:
     return Readers()
 
 
-@pytest.fixture
-def publisher(peer: Node) -> Publisher:
-    return peer.create_publisher(Float64, "topic", LATCHED)
-
-
 def half(message: Float64) -> float | None:
     return message.data / 2 if message.data > 0 else None
 
@@ -85,43 +79,22 @@ def half(message: Float64) -> float | None:
 # Items
 
 
-def test_item_is_made_once_for_all_observers(
-    node: ReactiveNode, publisher: Publisher, spin_until: SpinUntil
-) -> None:
-    made: list[float] = []
-    received: list[tuple[str, float | None]] = []
+def test_item_is_made_once_for_all_observers(readers: Readers) -> None:
+    made: list[str] = []
+    received: list[tuple[str, str]] = []
 
-    def item(message: Float64) -> float | None:
-        made.append(message.data)
-        return half(message)
+    def item(message: str) -> str | None:
+        made.append(message)
+        return None if message == "b" else message.upper()
 
-    observable = node.create_observable(Float64, "topic", LATCHED, item=item)
+    observable = readers.observable(10, item=item)
     for name in ("one", "two"):
         observable.subscribe(lambda value, name=name: received.append((name, value)))
-    spin_until(lambda: publisher.get_subscription_count() == 1)
-    for data in (1.0, -1.0, 3.0):
-        publisher.publish(Float64(data=data))
-    spin_until(lambda: len(received) == 4)
+    for message in "abc":
+        readers.receive(0, message, 1)
 
-    for observer in ("one", "two"):
-        assert [value for name, value in received if name == observer] == [0.5, 1.5]
-    assert made == [1.0, -1.0, 3.0]
-
-
-def test_late_observer_gets_retained_items(
-    node: ReactiveNode, publisher: Publisher, spin_until: SpinUntil
-) -> None:
-    first: list[float] = []
-    late: list[float] = []
-    observable = node.create_observable(Float64, "topic", LATCHED, item=half)
-    observable.subscribe(first.append)
-    spin_until(lambda: publisher.get_subscription_count() == 1)
-    for data in (1.0, 2.0, 3.0, 4.0, -1.0):
-        publisher.publish(Float64(data=data))
-        spin_until(lambda data=data: data < 0 or first[-1:] == [data / 2])
-
-    observable.subscribe(late.append)
-    spin_until(lambda: late == [1.0, 1.5, 2.0])
+    assert received == [("one", "A"), ("two", "A"), ("one", "C"), ("two", "C")]
+    assert made == [*"abc"]
 
 
 def test_item_may_be_made_of_a_timestamp(readers: Readers) -> None:
@@ -205,53 +178,6 @@ def test_info_is_collected_while_there_are_two_readers(readers: Readers) -> None
 # Every publisher
 
 
-def test_volatile_publisher_of_latched_topic_is_heard_if_wanted(
-    node: ReactiveNode, peer: Node, publisher: Publisher, spin_until: SpinUntil, spin_for: SpinFor
-) -> None:
-    received: list[float] = []
-    deaf: list[float] = []
-    node.create_observable(Float64, "topic", LATCHED, every_publisher=True).subscribe(
-        lambda message: received.append(message.data)
-    )
-    node.create_observable(Float64, "topic", LATCHED).subscribe(lambda message: deaf.append(message.data))
-    publisher.publish(Float64(data=1.0))
-    spin_until(lambda: received == deaf == [1.0])
-
-    by_hand = peer.create_publisher(Float64, "topic", 10)
-    spin_until(lambda: by_hand.get_subscription_count() == 1)
-    by_hand.publish(Float64(data=2.0))
-    spin_until(lambda: received == [1.0, 2.0])
-    spin_until(lambda: publisher.get_subscription_count() == 3)
-    publisher.publish(Float64(data=3.0))
-    spin_until(lambda: len(received) == 3 and len(deaf) == 2)
-    spin_for(0.05)
-
-    assert received == [1.0, 2.0, 3.0]
-    assert deaf == [1.0, 3.0]
-
-
-def test_burst_to_both_readers_comes_once(
-    node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
-) -> None:
-    many = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    received: list[float] = []
-    node.create_observable(Float64, "topic", many, every_publisher=True).subscribe(
-        lambda message: received.append(message.data)
-    )
-    latched, by_hand = (
-        peer.create_publisher(Float64, "topic", many),
-        peer.create_publisher(Float64, "topic", 10),
-    )
-    spin_until(lambda: latched.get_subscription_count() == 2 and by_hand.get_subscription_count() == 1)
-
-    for number in range(60):
-        latched.publish(Float64(data=float(number)))
-    spin_until(lambda: len(received) >= 60)
-    spin_for(0.2)
-
-    assert received == [float(number) for number in range(60)]
-
-
 @pytest.mark.parametrize("timestamped", [False, True])
 @pytest.mark.parametrize("first", [0, 1])
 def test_what_two_readers_deliver_comes_once(readers: Readers, timestamped: bool, first: int) -> None:
@@ -323,7 +249,11 @@ def test_next_observer_begins_with_one_reader(readers: Readers) -> None:
     assert received == ["a"]
 
 
-@pytest.mark.parametrize("qos", [10, QoSProfile(depth=1)])
-def test_volatile_topic_needs_no_second_reader(readers: Readers, qos: Any) -> None:
-    readers.observable(qos, every_publisher=True).subscribe()
+@pytest.mark.parametrize(
+    ("qos", "every_publisher"), [(10, True), (QoSProfile(depth=1), True), (LATCHED, False)]
+)
+def test_second_reader_is_only_of_latched_topics_if_wanted(
+    readers: Readers, qos: Any, every_publisher: bool
+) -> None:
+    readers.observable(qos, every_publisher=every_publisher).subscribe()
     assert readers.events == [None]

@@ -137,17 +137,6 @@ def test_message_comes_with_its_source_time(
     assert before - timedelta(milliseconds=1) <= received[0].timestamp <= after
 
 
-def test_raw_message_stays_serialized(
-    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
-) -> None:
-    received: list[Any] = []
-    node.create_sampled_observable(Float64, "topic", ticks, raw=True).subscribe(received.append)
-    talker.await_readers(2)
-    talker.say(1.0)
-    spin_until(lambda: ticks.on_next(NOW) or received)
-    assert bytes(received[0]) == b"\x00\x01\x00\x00" + b"\x00" * 6 + b"\xf0\x3f"
-
-
 def test_observers_share_a_reader_that_ends_with_the_last(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
@@ -171,16 +160,6 @@ def test_observers_share_a_reader_that_ends_with_the_last(
     talker.await_readers(2)
     talker.say(3.0)
     spin_until(lambda: ticks.on_next(NOW) or received[0][1:])
-
-
-def test_end_of_the_node_completes_it(node: ReactiveNode, ticks: Subject[None]) -> None:
-    ended: list[str] = []
-    topic = node.create_sampled_observable(Float64, "topic", ticks)
-    topic.subscribe(on_completed=lambda: ended.append("early"))
-    node.destroy_node()
-    topic.subscribe(on_completed=lambda: ended.append("late"))
-    assert ended == ["early", "late"]
-    ticks.on_next(NOW)
 
 
 @pytest.mark.parametrize("end", ["on_completed", "on_error"])
@@ -233,18 +212,6 @@ def test_retry_reads_on_after_an_error_of_the_item(
     spin_until(lambda: talker.publisher.publish(Float64(data=2.0)) or ticks.on_next(NOW) or received)
     assert received[0] == 0.5
     assert [type(error) for error in errors] == [ZeroDivisionError]
-
-
-def test_item_of_none_is_no_item(
-    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
-) -> None:
-    received: list[float] = []
-    topic = node.create_buffered_observable(Float64, "topic", ticks, item=lambda it: it.data or None)
-    topic.subscribe(received.append)
-    talker.await_readers(2)
-    talker.say(0.0, 1.0)
-    spin_until(lambda: ticks.on_next(NOW) or received)
-    assert received == [1.0]
 
 
 def test_reader_that_cannot_be_created_is_an_error_of_each_observer(
