@@ -20,6 +20,7 @@ from reactive_node.testing import SpinFor, SpinUntil, VirtualTime
 on_next, on_error, on_completed = ReactiveTest.on_next, ReactiveTest.on_error, ReactiveTest.on_completed
 subscribe = ReactiveTest.subscribe
 WORK = 2.0  # [s]
+PLANTED = ValueError("planted")
 
 
 class Work:
@@ -31,7 +32,7 @@ class Work:
     def __call__(self, item: str) -> str:
         self.items.append(item)
         if item == "bad":
-            raise ValueError("planted")
+            raise PLANTED
         return item.upper()
 
 
@@ -43,21 +44,63 @@ def work() -> Work:
 # In virtual time
 
 
-def test_each_item_is_worked_on_if_there_is_time(scheduler: VirtualTime, work: Work) -> None:
-    items = scheduler.hot((1, "a"), (3, "b"), (7, "c"))
+@pytest.mark.parametrize(
+    ("items", "messages", "worked", "end"),
+    [
+        pytest.param(
+            [on_next(1, "a"), on_next(3, "b"), on_next(7, "c")],
+            [on_next(3, "A"), on_next(5, "B"), on_next(9, "C")],
+            ["a", "b", "c"],
+            30,
+            id="time for each item",
+        ),
+        pytest.param(
+            [on_next(at, item) for at, item in zip((1, 1.5, 2, 2.5, 4, 20), "abcdef", strict=True)],
+            [on_next(3, "A"), on_next(5, "D"), on_next(7, "E"), on_next(22, "F")],
+            ["a", "d", "e", "f"],
+            30,
+            id="the newest item replaces those that wait",
+        ),
+        pytest.param(
+            [on_next(1, "a"), on_next(1.5, "b"), on_next(2, "c"), on_completed(2.5)],
+            [on_next(3, "A"), on_next(5, "C"), on_completed(5)],
+            ["a", "c"],
+            2.5,
+            id="completion waits for work and the newest item",
+        ),
+        pytest.param(
+            [on_next(1, "a"), on_completed(4)],
+            [on_next(3, "A"), on_completed(4)],
+            ["a"],
+            4,
+            id="completion of an idle source",
+        ),
+        pytest.param(
+            [on_next(1, "bad"), on_next(2, "b"), on_next(4, "c")],
+            [on_error(3, PLANTED)],
+            ["bad"],
+            3,
+            id="error of the work",
+        ),
+        pytest.param(
+            [on_next(1, "a"), on_next(1.5, "b"), on_error(2, PLANTED)],
+            [on_error(2, PLANTED)],
+            [],  # the worker's actions take effect when they end
+            2,
+            id="error of the source",
+        ),
+    ],
+)
+def test_items_are_worked_on_until_an_end(
+    scheduler: VirtualTime, work: Work, items: list[Any], messages: list[Any], worked: list[str], end: float
+) -> None:
+    source = scheduler.create_hot_observable(*items)
 
-    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
+    recording = scheduler.record(source.pipe(latest(work, scheduler.worker(WORK))), until=30)
 
-    assert recording.items == [(3, "A"), (5, "B"), (9, "C")]
-
-
-def test_newest_item_replaces_those_that_wait(scheduler: VirtualTime, work: Work) -> None:
-    items = scheduler.hot((1, "a"), (1.5, "b"), (2, "c"), (2.5, "d"), (4, "e"), (20, "f"))
-
-    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=30)
-
-    assert recording.items == [(3, "A"), (5, "D"), (7, "E"), (22, "F")]
-    assert work.items == ["a", "d", "e", "f"]
+    assert recording.messages == messages
+    assert work.items == worked
+    assert source.subscriptions == [subscribe(0, end)]
 
 
 def test_none_is_an_item(scheduler: VirtualTime) -> None:
@@ -66,35 +109,6 @@ def test_none_is_an_item(scheduler: VirtualTime) -> None:
     recording = scheduler.record(items.pipe(latest(repr, scheduler.worker(WORK))), until=10)
 
     assert recording.items == [(3, "'a'"), (5, "None")]
-
-
-def test_completion_waits_for_work_and_newest_item(scheduler: VirtualTime, work: Work) -> None:
-    items = scheduler.create_hot_observable(
-        on_next(1, "a"), on_next(1.5, "b"), on_next(2, "c"), on_completed(2.5)
-    )
-
-    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
-
-    assert recording.messages == [on_next(3, "A"), on_next(5, "C"), on_completed(5)]
-    assert items.subscriptions == [subscribe(0, 2.5)]
-
-
-def test_completion_of_idle_source_is_immediate(scheduler: VirtualTime, work: Work) -> None:
-    items = scheduler.create_hot_observable(on_next(1, "a"), on_completed(4))
-
-    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
-
-    assert recording.messages == [on_next(3, "A"), on_completed(4)]
-
-
-def test_error_of_work_ends_observable_and_work(scheduler: VirtualTime, work: Work) -> None:
-    items = scheduler.hot((1, "bad"), (2, "b"), (4, "c"))
-
-    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
-
-    assert recording.messages == [on_error(3, ValueError("planted"))]
-    assert work.items == ["bad"]
-    assert items.subscriptions == [subscribe(0, 3)]
 
 
 @pytest.mark.parametrize("kind", [asyncio.CancelledError, SystemExit, KeyboardInterrupt])
@@ -111,17 +125,6 @@ def test_exit_of_work_is_error_of_observable(scheduler: VirtualTime, kind: type[
     assert isinstance(message.value, OnError)
     assert isinstance(message.value.exception, RuntimeError)
     assert message.value.exception.__cause__ is planted
-
-
-def test_error_of_source_is_immediate_and_ends_work(scheduler: VirtualTime, work: Work) -> None:
-    items = scheduler.create_hot_observable(
-        on_next(1, "a"), on_next(1.5, "b"), on_error(2, ValueError("planted"))
-    )
-
-    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
-
-    assert recording.messages == [on_error(2, ValueError("planted"))]
-    assert work.items == []  # the worker's actions take effect when they end
 
 
 def test_disposing_begins_no_work_any_more(scheduler: VirtualTime, work: Work) -> None:
