@@ -74,21 +74,6 @@ def test_periodic_action_catches_up_if_it_is_at_most_50_ms_late(
     assert len(ran) == runs
 
 
-def test_action_that_disposes_itself_leaves_nothing_in_the_heap(
-    node: ReactiveNode, spin_until: SpinUntil
-) -> None:
-    ran: list[bool] = []
-
-    def once(_: Any) -> None:
-        ran.append(True)
-        periodic.dispose()
-
-    periodic = node.scheduler.schedule_periodic(0.001, once)
-    spin_until(lambda: ran)
-
-    assert node.scheduler.kept == 0
-
-
 def test_ended_node_keeps_no_actions(make_node: MakeNode) -> None:
     node = make_node("ended")
     node.scheduler.schedule_relative(60.0, lambda *_: None)
