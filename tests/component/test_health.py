@@ -102,6 +102,24 @@ def service(make_node: MakeNode) -> ServiceNode:
     return service
 
 
+@pytest.fixture
+def logged(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The warnings of the service."""
+    warnings: list[str] = []
+    logger = service.get_logger()
+    monkeypatch.setattr(logger, "warning", warnings.append)
+    monkeypatch.setattr(service, "get_logger", lambda: logger)
+    return warnings
+
+
+@pytest.fixture
+def published(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The reports of the service."""
+    reports: list[Any] = []
+    monkeypatch.setattr(service.health.publisher, "publish", reports.append)
+    return reports
+
+
 def test_health_is_due_every_second_on_the_steady_clock(service: ServiceNode) -> None:
     (timer,) = [timer for timer in service.timers if not timer.is_canceled()]
 
@@ -141,11 +159,7 @@ def test_report_carries_the_time_of_day_in_simulated_time(make_node: MakeNode, s
     assert abs(time.time_ns() - Time.from_msg(heard[-1].header.stamp).nanoseconds) < 10e9
 
 
-def test_warning_is_logged_when_it_is_new(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
-    logged: list[str] = []
-    logger = service.get_logger()
-    monkeypatch.setattr(logger, "warning", logged.append)
-    monkeypatch.setattr(service, "get_logger", lambda: logger)
+def test_warning_is_logged_when_it_is_new(service: ServiceNode, logged: list[str]) -> None:
     for reasons in (["late", "early"], ["late"], ["late", "lost"], [], ["late"]):
         for reason in reasons:
             service.remark("l1", reason)
@@ -155,14 +169,8 @@ def test_warning_is_logged_when_it_is_new(service: ServiceNode, monkeypatch: pyt
 
 
 def test_cause_with_other_numbers_is_no_new_cause(
-    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+    service: ServiceNode, logged: list[str], published: list[Any]
 ) -> None:
-    logged: list[str] = []
-    sent: list[Any] = []
-    logger = service.get_logger()
-    monkeypatch.setattr(logger, "warning", logged.append)
-    monkeypatch.setattr(service, "get_logger", lambda: logger)
-    monkeypatch.setattr(service.health, "publisher", SimpleNamespace(publish=sent.append))
     for second in range(3):
         for age in range(10):
             service.health.drop("theta1", f"it is {second}.{age}00 s old")
@@ -173,7 +181,7 @@ def test_cause_with_other_numbers_is_no_new_cause(
     service.health.report()
 
     assert logged == ["disk: 0 MB are left; theta1: -0e-05 is not finite; theta1: it is 0.000 s old"]
-    assert [each.status[0].message for each in sent[1:3]] == [
+    assert [each.status[0].message for each in published[1:3]] == [
         f"theta1: it is {second}.000 s old (10 times); theta1: -{second}e-05 is not finite; "
         f"disk: {second} MB are left"
         for second in (1, 2)
@@ -209,13 +217,7 @@ def test_number_that_is_measured_is_no_part_of_a_cause(one: str, other: str) -> 
     assert cause(one) == cause(other)
 
 
-def test_long_cause_with_other_numbers_is_no_new_cause(
-    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    logged: list[str] = []
-    logger = service.get_logger()
-    monkeypatch.setattr(logger, "warning", logged.append)
-    monkeypatch.setattr(service, "get_logger", lambda: logger)
+def test_long_cause_with_other_numbers_is_no_new_cause(service: ServiceNode, logged: list[str]) -> None:
     for number in (7, 1234.5):
         service.remark("drive", f"its motors have {[number] * 20} C, " + 30 * "and so on ")
         service.health.report()
@@ -223,22 +225,18 @@ def test_long_cause_with_other_numbers_is_no_new_cause(
     assert len(logged) == 1
 
 
-def test_report_is_never_too_large_to_be_read(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
-    sent: list[Any] = []
-    monkeypatch.setattr(service.health, "publisher", SimpleNamespace(publish=sent.append))
+def test_report_is_never_too_large_to_be_read(service: ServiceNode, published: list[Any]) -> None:
     for number in range(1000):
         for subject in ("l1", "l2", "theta1", "theta2"):
             service.health.refuse(subject, f"{number}\ufffd" * 10_000, -(2**63) + number, -(2**63))
         for topic in ROWS:
             service.health.drop(topic.name, f"{number}\ufffd" * 10_000)
     service.health.report()
-    assert len(serialize_message(sent[0])) <= LARGEST_MESSAGE
-    assert bad_report(sent[0]) == ""
+    assert len(serialize_message(published[0])) <= LARGEST_MESSAGE
+    assert bad_report(published[0]) == ""
 
 
-def test_standing_warning_is_in_each_report(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
-    published: list[Any] = []
-    monkeypatch.setattr(service.health.publisher, "publish", published.append)
+def test_standing_warning_is_in_each_report(service: ServiceNode, published: list[Any]) -> None:
     service.health.standing = {"disk": "it is nearly full"}
     service.remark("l1", "late")
     for _ in range(2):
@@ -254,10 +252,8 @@ def test_standing_warning_is_in_each_report(service: ServiceNode, monkeypatch: p
 
 
 def test_report_has_host_uptime_and_age_of_the_last_output(
-    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+    service: ServiceNode, published: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    published: list[Any] = []
-    monkeypatch.setattr(service.health.publisher, "publish", published.append)
     monkeypatch.setattr(service.health, "_started", 100.0)
     monkeypatch.setattr("interfaces.service.health.time.monotonic", lambda: 107.0)
     service.health.count_output()
@@ -269,6 +265,7 @@ def test_report_has_host_uptime_and_age_of_the_last_output(
     (status,) = array.status
     values = {pair.key: pair.value for pair in status.values}
     assert (values["uptime"], values["seconds_since_output"], values["published"]) == ("7.500", "0.500", "1")
+    assert (status.name, values["pid"]) == ("/service", str(os.getpid()))
     assert (status.hardware_id, status.level) == (socket.gethostname(), DiagnosticStatus.OK)
     assert before <= Time.from_msg(array.header.stamp) <= service.get_clock().now()
 
@@ -300,14 +297,11 @@ def test_report_is_sent_when_a_subscriber_comes_not_when_one_goes(
 
 
 def test_new_subscriber_hears_what_the_last_look_found(
-    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
+    service: ServiceNode, published: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    service = make_node("service", kind=ServiceNode)
     found = iter([["a loop"], []])
     health = service.health
     monkeypatch.setattr(service.peers, "problems", lambda: (("cmd_vel_in", reason) for reason in next(found)))
-    published: list[Any] = []
-    monkeypatch.setattr(health.publisher, "publish", published.append)
     health.on_period()
     health.on_matched(SimpleNamespace(current_count_change=1))
     health.on_matched(SimpleNamespace(current_count_change=1))
