@@ -85,15 +85,6 @@ def test_new_command_ends_the_repetition_of_the_last_one(scheduler: TestSchedule
     assert results.messages == [on_next(time, command) for time, command in times]
 
 
-def test_command_is_repeated_a_limited_number_of_times(scheduler: TestScheduler) -> None:
-    commands = scheduler.create_hot_observable(on_next(210, TURN_ON))
-    states = scheduler.create_hot_observable(on_next(215, OFF))
-
-    results = scheduler.start(lambda: engine_commands(commands, states, rx.never(), period=10, times=3))
-
-    assert results.messages == [on_next(time, TURN_ON) for time in (210, 220, 230)]
-
-
 Play = Callable[[str], Wired]
 
 

@@ -64,13 +64,6 @@ def test_three_silences_turn_off_as_in_the_listing(scheduler: TestScheduler) -> 
     assert heartbeats.subscriptions == [subscribe(BEGIN, 14.6)]
 
 
-def test_retry_subscribes_three_times_in_all(scheduler: TestScheduler) -> None:
-    watched = watch(scheduler, hot(scheduler, 1.0), 99.0)
-
-    assert watched.missed == [4.01, 7.01, 10.01]
-    assert watched.incapacitated == [10.01]
-
-
 def test_alive_has_the_source_time_of_the_sampled_heartbeat(scheduler: TestScheduler) -> None:
     heartbeats = hot(scheduler, 0.1, 0.4)
 
@@ -131,12 +124,6 @@ def test_heartbeats_at_the_moments_of_the_samples_count(scheduler: TestScheduler
 
     assert len(watched.alive) == 38
     assert watched[1:] == ([], [], [])
-
-
-def test_silence_of_almost_three_seconds_is_no_strike(scheduler: TestScheduler) -> None:
-    heartbeats = hot(scheduler, *(0.1 + step * 2.4 for step in range(40)))
-
-    assert watch(scheduler, heartbeats, 90.0)[1:] == ([], [], [])
 
 
 def test_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> None:
@@ -211,18 +198,6 @@ def test_successor_that_hears_nothing_begins_to_count(scheduler: TestScheduler) 
     assert [round(time, 3) for time in watched.incapacitated] == [10.01]
 
 
-@given(st.lists(st.integers(1, 2499), min_size=1, max_size=20))
-def test_watchdog_does_not_fire_without_a_silence(gaps: list[int]) -> None:
-    times = [10.0]
-    for gap in gaps:
-        times.append(times[-1] + gap)
-    scheduler = TestScheduler()
-
-    watched = watch(scheduler, hot(scheduler, *(time / 1000 for time in times)), times[-1] / 1000)
-
-    assert watched[1:] == ([], [], [])
-
-
 @given(st.integers(1, 50), st.integers(10, 100))
 def test_a_lost_heartbeat_is_no_strike_if_silence_is_sampling_and_two_periods(
     begin: int, sampling: int
@@ -234,17 +209,6 @@ def test_a_lost_heartbeat_is_no_strike_if_silence_is_sampling_and_two_periods(
     watched = watch(scheduler, hot(scheduler, *times), times[-1], parameters=shortest, resumes=True)
 
     assert watched[1:] == ([], [], [])
-
-
-@given(st.lists(st.integers(3500, 6000), min_size=3, max_size=3))
-def test_three_gaps_with_a_silence_each_turn_off(gaps: list[int]) -> None:
-    times = [500.0]
-    for gap in gaps:
-        times.append(times[-1] + gap)
-    scheduler = TestScheduler()
-    heartbeats = hot(scheduler, *(time / 1000 for time in times))
-
-    assert watch(scheduler, heartbeats, times[-1] / 1000 + 0.001).turn_off
 
 
 def test_turn_off_repeats_until_the_operator_is_alive(scheduler: TestScheduler) -> None:
