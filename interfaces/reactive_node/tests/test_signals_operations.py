@@ -221,33 +221,6 @@ def test_derivative_is_the_mean_rate_of_change(over: float, samples: list[Arriva
     )
 
 
-def test_derivative_of_a_lifted_function_is_its_derivative(scheduler: VirtualTime) -> None:
-    angle = of_time(lambda time: 2.0 * time / SECOND)
-    position = lift(lambda a, length: (length * math.cos(a), length * math.sin(a)))(angle, 3.0)
-
-    for time, (x, y), _ in answers(scheduler, position.derivative(0.001)):
-        assert x == pytest.approx(-6.0 * math.sin(2.0 * time / SECOND), abs=1e-5)
-        assert y == pytest.approx(6.0 * math.cos(2.0 * time / SECOND), abs=1e-5)
-
-
-def test_derivative_at_a_sample_is_the_mean_of_both_slopes(scheduler: VirtualTime) -> None:
-    samples = [Arrival(0, 0.0, 0), Arrival(200 * MS, 0.2, 0), Arrival(400 * MS, 0.8, 0)]
-    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP)
-
-    found = answers(scheduler, signal.derivative(0.1), 0.1)
-
-    assert [each.value for each in found[1:4]] == pytest.approx([1.0, 2.0, 3.0])
-
-
-def test_no_silence_within_its_gap_hides_from_a_derivative(scheduler: VirtualTime) -> None:
-    samples = [Arrival(time * MS, 0.0, 0) for time in (0, 200, 400, 900, 1100)]
-    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=Held())
-
-    unmarked = {each.time // MS for each in answers(scheduler, signal.derivative(GAP), 0.01) if not each.mark}
-
-    assert unmarked == set(range(150, 251, 10))
-
-
 @given(arrivals(), st.integers(7, 40), st.sampled_from([0.017, 0.05]))
 def test_integral_is_the_sum_of_trapezoids(samples: list[Arrival], step: int, period: float) -> None:
     scheduler = VirtualTime()
@@ -303,21 +276,6 @@ def test_integral_of_an_integral(scheduler: VirtualTime) -> None:
     x, y = answers(scheduler, twice, 0.5, until=3.0)[-1].value
 
     assert (x, y) == pytest.approx((9.0, 18.0))
-
-
-@given(arrivals())
-def test_derivative_of_the_integral_is_the_mean_of_neighbours(samples: list[Arrival]) -> None:
-    scheduler = VirtualTime()
-    signal, f = meaning(scheduler, samples)
-    times = (-10 * MS, 0, 10 * MS)
-
-    def mean(time: int) -> Value:
-        if f(time - times[2])[1] == UNKNOWN:  # the integral has not begun
-            return None, UNKNOWN
-        value, _ = lifted(lambda p, q, r: (p + 2 * q + r) / 4, *(f(time + each) for each in times))
-        return value, max(f(at)[1] for at in range(0, time + 11 * MS, 10 * MS) if f(at)[1] != UNKNOWN)
-
-    check(answers(scheduler, signal.integral(0.01).derivative(0.02), 0.02), mean, count=30)
 
 
 @given(arrivals())
@@ -445,15 +403,6 @@ def test_when_misses_no_change_longer_than_its_resolution(samples: list[Arrival]
         value, mark = f(time)
         state = value > 0.5 if mark == CERTAIN else state
         assert ([is_true for is_true, at in found if at <= time] or [False])[-1] == state
-
-
-def test_when_finds_a_crossing_between_samples(scheduler: VirtualTime) -> None:
-    samples = arriving(scheduler, [Arrival(0, 0.0, 0), Arrival(300 * MS, 3.0, 0), Arrival(600 * MS, 0.0, 0)])
-    signal = linear(samples, lateness=LATENESS, gap=GAP)
-
-    found = changes(scheduler, signal.when(lambda value: value >= 1.25, resolution=0.01))
-
-    assert found == [(True, 125 * MS), (False, pytest.approx(475 * MS, abs=1))]
 
 
 def test_when_finds_a_crossing_long_before_it_looks(scheduler: VirtualTime) -> None:

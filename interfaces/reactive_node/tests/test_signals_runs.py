@@ -28,7 +28,7 @@ from interfaces.reactive_node.tests.arrivals import (
     arriving,
     items,
 )
-from reactive_node import ReactiveNode, stamps
+from reactive_node import ReactiveNode
 from reactive_node.signals import (
     CERTAIN,
     Answer,
@@ -394,24 +394,6 @@ def test_disposal_ends_everything(scheduler: VirtualTime) -> None:
 
 
 # On a node
-
-
-def test_a_topic_becomes_a_signal_by_the_source_times(
-    node: ReactiveNode, peer: Node, spin_until: SpinUntil
-) -> None:
-    publisher = peer.create_publisher(Float64, "value", 10)
-    messages = node.create_observable(Float64, "value", timestamped=True)
-    values = messages.map(lambda it: it._replace(value=it.value.data))
-    found: list[Answer[float]] = []
-    before = stamps.to_nanoseconds(stamps.now())
-    hold(values, lateness=0.1).sample(0.01).subscribe(found.append, scheduler=node.scheduler)
-
-    spin_until(lambda: publisher.get_subscription_count())
-    publisher.publish(Float64(data=3.0))
-    spin_until(lambda: found and found[-1].is_certain)
-
-    assert found[-1].value == 3.0
-    assert before <= found[-1].time <= stamps.to_nanoseconds(stamps.now())
 
 
 @pytest.mark.parametrize("hours", [1, -1])

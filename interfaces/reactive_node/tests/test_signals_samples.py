@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import zip_longest
 from typing import Any
 
@@ -78,11 +79,23 @@ def straight(samples: list[Arrival], time: int, silence: Silence) -> tuple[Any, 
     return None, UNKNOWN
 
 
+def asked(
+    scheduler: VirtualTime,
+    samples: list[Arrival],
+    silence: Silence | None = None,
+    period: float = 0.017,
+    until: float = 1.5,
+) -> tuple[list[Answer[Any]], list[Refused]]:
+    """Return the answers of `hold`, or of `linear` with a silence, and what was refused."""
+    refused: list[Refused] = []
+    make: Any = hold if silence is None else partial(linear, gap=GAP, silence=silence)
+    signal = make(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
+    return answers(scheduler, signal, period, until), refused
+
+
 @given(arrivals())
 def test_hold_is_the_last_value_however_late_it_arrives(samples: list[Arrival]) -> None:
-    scheduler = VirtualTime()
-
-    found = answers(scheduler, hold(arriving(scheduler, samples), lateness=LATENESS))
+    found, _ = asked(VirtualTime(), samples)
 
     assert [each.time for each in found[:3]] == [0, 17 * MS, 34 * MS]
     assert found[-1].time >= 1383 * MS
@@ -93,10 +106,7 @@ def test_hold_is_the_last_value_however_late_it_arrives(samples: list[Arrival]) 
 @pytest.mark.parametrize("silence", [Nothing(), Unchanged(), Held(), Extrapolated(0.03)], ids=repr)
 @given(samples=arrivals())
 def test_linear_is_the_line_between_neighbours(samples: list[Arrival], silence: Silence) -> None:
-    scheduler = VirtualTime()
-    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=silence)
-
-    found = answers(scheduler, signal)
+    found, _ = asked(VirtualTime(), samples, silence)
 
     assert found[-1].time >= 1323 * MS
     for time, value, mark in found:
@@ -104,35 +114,9 @@ def test_linear_is_the_line_between_neighbours(samples: list[Arrival], silence: 
 
 
 def test_movement_of_two_samples_a_gap_apart_goes_on(scheduler: VirtualTime) -> None:
-    samples = arriving(scheduler, [Arrival(0, 0.0, 0), Arrival(GAP_NS, 6.0, 0)])
-    signal = linear(samples, lateness=LATENESS, gap=GAP, silence=Extrapolated(GAP))
+    found, _ = asked(scheduler, [Arrival(0, 0.0, 0), Arrival(GAP_NS, 6.0, 0)], Extrapolated(GAP), GAP)
 
-    assert answers(scheduler, signal, GAP)[2] == Answer(2 * GAP_NS, 12.0, EXTRAPOLATED)
-
-
-@given(arrivals(), st.data())
-def test_answers_do_not_depend_on_the_order_of_arrival(samples: list[Arrival], data: Any) -> None:
-    """Not even their bytes."""
-    other = [each._replace(delay=MS * data.draw(st.integers(0, 99))) for each in samples]
-    results = []
-    for each in (samples, other):
-        scheduler = VirtualTime()
-        results.append(answers(scheduler, linear(arriving(scheduler, each), lateness=LATENESS, gap=GAP)))
-
-    assert repr(results[0]) == repr(results[1])
-
-
-@given(st.floats(-10, 10), st.floats(-10, 10), arrivals(st.none()))
-def test_linear_motion_is_exact(position: float, speed: float, samples: list[Arrival]) -> None:
-    def at(time: int) -> float:
-        return position + speed * time / SECOND
-
-    scheduler = VirtualTime()
-    moving = [each._replace(value=at(each.time)) for each in samples]
-    for time, value, mark in answers(
-        scheduler, linear(arriving(scheduler, moving), lateness=LATENESS, gap=GAP)
-    ):
-        assert mark == UNKNOWN or value == pytest.approx(at(time), abs=1e-9)
+    assert found[2] == Answer(2 * GAP_NS, 12.0, EXTRAPOLATED)
 
 
 def test_linear_follows_the_structure_of_tuples(scheduler: VirtualTime) -> None:
@@ -221,14 +205,6 @@ def test_a_line_is_answered_when_its_second_sample_is_settled(scheduler: Virtual
     assert max(waited) == pytest.approx(LATENESS + 0.01)
 
 
-def test_silence_is_answered_after_lateness_and_gap(scheduler: VirtualTime) -> None:
-    signal = linear(scheduler.hot(), lateness=LATENESS, gap=GAP, silence=Unchanged())
-
-    recording = scheduler.record(signal.sample(0.01), until=0.4)
-
-    assert recording.items[0] == (pytest.approx(LATENESS + GAP), Answer(0, None, UNKNOWN))
-
-
 def test_a_resting_state_is_answered_after_lateness_and_gap(scheduler: VirtualTime) -> None:
     samples = arriving(scheduler, [Arrival(0, 1.0, 0)])
     signal = linear(samples, lateness=LATENESS, gap=GAP, silence=Unchanged())
@@ -242,9 +218,8 @@ def test_a_resting_state_is_answered_after_lateness_and_gap(scheduler: VirtualTi
 
 def test_a_state_that_pauses_for_twice_the_gap_is_held(scheduler: VirtualTime) -> None:
     samples = [Arrival(0, 1.0, 0), Arrival(2 * GAP_NS, 3.0, 0)]
-    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=Unchanged())
 
-    found = answers(scheduler, signal, 0.001)
+    found, _ = asked(scheduler, samples, Unchanged(), 0.001)
 
     assert {each.mark for each in found if 0 < each.time < 2 * GAP_NS} == {HELD}
 
@@ -261,11 +236,9 @@ def test_a_held_value_is_answered_after_lateness(scheduler: VirtualTime) -> None
 
 
 def test_late_sample_is_dropped_and_reported(scheduler: VirtualTime) -> None:
-    refused: list[Refused] = []
     samples = [Arrival(0, 1.0, 0), Arrival(20 * MS, 9.0, 101 * MS), Arrival(40 * MS, 3.0, 0)]
-    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, refused=refused.append)
 
-    found = answers(scheduler, signal, 0.02)
+    found, refused = asked(scheduler, samples, Nothing(), 0.02)
 
     assert found[:3] == [Answer(0, 1.0), Answer(20 * MS, 2.0), Answer(40 * MS, 3.0)]
     assert refused == [Refused(20 * MS, 9.0, "it is 0.101 s late")]
@@ -273,12 +246,9 @@ def test_late_sample_is_dropped_and_reported(scheduler: VirtualTime) -> None:
 
 @pytest.mark.parametrize("is_state", [True, False])
 def test_late_value_of_a_state_counts_if_it_is_the_newest(scheduler: VirtualTime, is_state: bool) -> None:
-    refused: list[Refused] = []
-    samples = arriving(scheduler, [Arrival(0, 1.0, 0), Arrival(20 * MS, 9.0, 400 * MS)])
-    silence = Unchanged() if is_state else Held()
-    signal = linear(samples, lateness=LATENESS, gap=GAP, silence=silence, refused=refused.append)
+    samples = [Arrival(0, 1.0, 0), Arrival(20 * MS, 9.0, 400 * MS)]
 
-    found = answers(scheduler, signal, 0.02)
+    found, refused = asked(scheduler, samples, Unchanged() if is_state else Held(), 0.02)
 
     taken = 320 * MS + 1 if is_state else None
     assert refused == [Refused(20 * MS, 9.0, "it is 0.400 s late", taken)]
@@ -289,23 +259,19 @@ def test_late_value_of_a_state_counts_if_it_is_the_newest(scheduler: VirtualTime
 @given(arrivals(st.none(), most=400))
 def test_late_value_of_a_state_bends_no_line(samples: list[Arrival]) -> None:
     """A certain value is on the line of the movement, or that of a state that rests."""
-    scheduler = VirtualTime()
     moving = [each._replace(value=float(each.time)) for each in samples]
-    signal = linear(arriving(scheduler, moving), lateness=LATENESS, gap=GAP, silence=Unchanged())
+
+    found, _ = asked(VirtualTime(), moving, Unchanged(), 0.01, until=2.5)
 
     measured = {each.value for each in moving}
-    for time, value, mark in answers(scheduler, signal, 0.01, until=2.5):
+    for time, value, mark in found:
         assert mark != CERTAIN or value in measured or value == pytest.approx(time)
 
 
 @given(arrivals(most=900))
 def test_resting_state_has_its_newest_value_however_late_it_came(samples: list[Arrival]) -> None:
-    for make in (
-        lambda it: hold(it, lateness=LATENESS),
-        lambda it: linear(it, lateness=LATENESS, gap=GAP, silence=Unchanged()),
-    ):
-        scheduler = VirtualTime()
-        (*_, last) = answers(scheduler, make(arriving(scheduler, samples)), until=3.0)
+    for silence in (None, Unchanged()):
+        (*_, last), _ = asked(VirtualTime(), samples, silence, until=3.0)
 
         assert last.value == (samples[-1].value if samples else None)
 
@@ -318,17 +284,14 @@ def test_movement_goes_on_after_late_values(
     scheduler: VirtualTime, pause: int, dropped: range, held: list[int]
 ) -> None:
     """After 80 ms, the network pauses; then all samples come together. 320 ms look like a rest."""
-    refused: list[Refused] = []
     delays = [0] * 5 + [max(0, 80 + pause - 20 * k) for k in range(5, 40)]
     ramp = [Arrival(k * 20 * MS, float(k), delay * MS) for k, delay in enumerate(delays)]
-    signal = linear(
-        arriving(scheduler, ramp), lateness=LATENESS, gap=GAP, silence=Unchanged(), refused=refused.append
-    )
 
-    found = [each for each in answers(scheduler, signal, 0.01) if each.time <= 780 * MS]
+    found, refused = asked(scheduler, ramp, Unchanged(), 0.01)
 
     assert [each.value for each in refused if each.taken is None] == list(dropped)
-    assert [each.time // MS for each in found if not each.is_certain] == [t for t in held if t % 10 == 0]
+    uncertain = [each.time // MS for each in found if each.time <= 780 * MS and not each.is_certain]
+    assert uncertain == [t for t in held if t % 10 == 0]
 
 
 @pytest.mark.parametrize(
@@ -346,13 +309,9 @@ def test_late_value_of_a_state_counts_two_gaps_after_the_sample_before(
     scheduler: VirtualTime, following: list[Arrival], taken: list[int | None]
 ) -> None:
     """If none follows by then. No line leads to it or from it: what follows within a gap is as late."""
-    refused: list[Refused] = []
     samples = [Arrival(0, 1.0, 0), Arrival(20 * MS, 9.0, 100 * MS), *following]
-    signal = linear(
-        arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=Unchanged(), refused=refused.append
-    )
 
-    found = answers(scheduler, signal, 0.001)
+    found, refused = asked(scheduler, samples, Unchanged(), 0.001)
 
     reasons = ["it is 0.100 s late", "it comes right after a late one"]
     assert refused == [
@@ -369,11 +328,9 @@ def test_late_value_of_a_state_counts_two_gaps_after_the_sample_before(
 
 
 def test_the_newest_of_several_late_values_counts(scheduler: VirtualTime) -> None:
-    refused: list[Refused] = []
     late = [Arrival(k * MS, float(k), (400 - k) * MS) for k in range(3)]
-    signal = hold(arriving(scheduler, late), lateness=LATENESS, refused=refused.append)
 
-    found = answers(scheduler, signal, 0.1)
+    found, refused = asked(scheduler, late, period=0.1)
 
     assert [each.taken for each in refused] == [300 * MS + k for k in (1, 2, 3)]
     assert [each.value for each in found[3:5]] == [None, 2.0]
@@ -387,19 +344,16 @@ def test_the_shortest_lateness_is_a_nanosecond(scheduler: VirtualTime) -> None:
 
 def test_sample_on_its_bound_is_too_late(scheduler: VirtualTime) -> None:
     """The value at that time is settled already."""
-    refused: list[Refused] = []
     samples = [Arrival(0, 1.0, 0), Arrival(200 * MS, 9.0, 100 * MS), Arrival(250 * MS, 3.0, 0)]
-    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
 
-    assert answers(scheduler, signal, 0.1)[2:4] == [Answer(200 * MS, 1.0), Answer(300 * MS, 3.0)]
+    found, refused = asked(scheduler, samples, period=0.1)
+
+    assert found[2:4] == [Answer(200 * MS, 1.0), Answer(300 * MS, 3.0)]
     assert [each.time for each in refused] == [200 * MS]
 
 
 def test_late_copy_of_the_last_value_is_dropped(scheduler: VirtualTime) -> None:
-    refused: list[Refused] = []
-    samples = arriving(scheduler, [Arrival(0, 1.0, 0), Arrival(0, 2.0, 400 * MS)])
-
-    found = answers(scheduler, hold(samples, lateness=LATENESS, refused=refused.append), 0.1)
+    found, refused = asked(scheduler, [Arrival(0, 1.0, 0), Arrival(0, 2.0, 400 * MS)], period=0.1)
 
     assert {each.value for each in found} == {1.0}
     assert [each.taken for each in refused] == [None]
@@ -416,56 +370,44 @@ def test_nothing_that_an_answer_needs_is_forgotten(scheduler: VirtualTime) -> No
 
 def test_first_value_of_a_state_may_be_old(scheduler: VirtualTime) -> None:
     """A transient-local topic delivers it when it is discovered."""
-    samples = arriving(scheduler, [Arrival(0, 1.0, 500 * MS)])
-    refused: list[Refused] = []
-
-    found = answers(scheduler, hold(samples, lateness=LATENESS, refused=refused.append), 0.1)
+    found, refused = asked(scheduler, [Arrival(0, 1.0, 500 * MS)], period=0.1)
 
     assert refused == [Refused(0, 1.0, "it is 0.500 s late", 400 * MS + 1, is_first=True)]
-
     assert [each.value for each in found[:7]] == [None] * 5 + [1.0] * 2
 
 
 def test_what_comes_right_after_an_old_first_value_says_so(scheduler: VirtualTime) -> None:
     """It is no news that a late reader gets an old value."""
-    refused: list[Refused] = []
     samples = [Arrival(0, 1.0, 500 * MS), Arrival(450 * MS, 3.0, 80 * MS), Arrival(600 * MS, 4.0, 0)]
-    signal = linear(
-        arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=Unchanged(), refused=refused.append
-    )
 
-    answers(scheduler, signal)
+    _, refused = asked(scheduler, samples, Unchanged())
 
     assert [(each.value, each.is_first) for each in refused] == [(1.0, True), (3.0, True)]
 
 
 def test_late_value_does_not_replace_a_newer_one_that_waits(scheduler: VirtualTime) -> None:
     samples = [Arrival(0, 1.0, 200 * MS), Arrival(150 * MS, 2.0, 0)]
-    refused: list[Refused] = []
-    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
 
-    assert answers(scheduler, signal, 0.1)[2] == Answer(200 * MS, 2.0)
+    found, refused = asked(scheduler, samples, period=0.1)
+
+    assert found[2] == Answer(200 * MS, 2.0)
     assert [each.taken for each in refused] == [None]
 
 
 def test_sample_far_ahead_of_the_clock_is_dropped(scheduler: VirtualTime) -> None:
     """It would wait, and fill the memory."""
-    refused: list[Refused] = []
     samples = [Arrival(0, 1.0, 0), Arrival(200 * MS, 2.0, -100 * MS), Arrival(500 * MS, 3.0, -101 * MS)]
-    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
 
-    found = answers(scheduler, signal, 0.1)
+    found, refused = asked(scheduler, samples, period=0.1)
 
     assert found[-1].value == 2.0
     assert refused == [Refused(500 * MS, 3.0, "it is 0.101 s ahead of the clock")]
 
 
 def test_of_two_samples_with_one_time_the_first_counts(scheduler: VirtualTime) -> None:
-    refused: list[Refused] = []
-    samples = [Arrival(0, 2.0, 0), Arrival(0, 1.0, MS)]
-    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
+    found, refused = asked(scheduler, [Arrival(0, 2.0, 0), Arrival(0, 1.0, MS)])
 
-    assert {each.value for each in answers(scheduler, signal)} == {2.0}
+    assert {each.value for each in found} == {2.0}
     assert refused == [Refused(0, 1.0, "another sample has the same time")]
 
 
