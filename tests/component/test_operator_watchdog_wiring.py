@@ -101,12 +101,13 @@ def test_of_a_burst_of_heartbeats_the_newest_is_judged(
 def test_heartbeats_are_read_by_the_clock_before_they_are_old(
     wired: Any, monkeypatch: pytest.MonkeyPatch, sampling: float, lifespan: float, period: float
 ) -> None:
-    observe = mock.Mock(wraps=ServiceNode.observe_sampled)
-    monkeypatch.setattr(ServiceNode, "observe_sampled", lambda *given, **options: observe(*given, **options))
+    create = mock.Mock(wraps=ServiceNode.create_sampled_observable)
+    monkeypatch.setattr(
+        ServiceNode, "create_sampled_observable", lambda *given, **named: create(*given, **named)
+    )
     wired(sampling=sampling, lifespan=lifespan)
-    (call,) = (each for each in observe.mock_calls if each.args[1] is OPERATOR_HEARTBEAT)
-    assert call.args[2] == pytest.approx(period)
-    assert call.kwargs["max_age"] == lifespan
+    (call,) = create.mock_calls
+    assert call.args[2:4] == (OPERATOR_HEARTBEAT.name, pytest.approx(period))
 
 
 @pytest.mark.parametrize("sampling", [0.4, 0.5])
