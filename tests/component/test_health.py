@@ -10,17 +10,19 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import ClockType
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 
 from interfaces.arm_variables import SYSTEM
 from interfaces.limits import LARGEST_MESSAGE, bad_report
+from interfaces.reactive_node.tests.leftovers import assert_nothing_is_left
 from interfaces.service import ServiceNode
 from interfaces.service.beats import Beats
 from interfaces.service.health import cause, healths, heard_healths, reported_parameters
 from interfaces.topics import DIAGNOSTICS, ROWS
-from reactive_node.testing import MakeNode, SpinUntil
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from services import dead_mans_switch, operator_watchdog
 
 GOOD = {"pid": "7", "published": "3", "seconds_since_output": "0.5"}
@@ -314,3 +316,22 @@ def test_new_subscriber_hears_what_the_last_look_found(
 def test_subscriber_that_comes_as_the_node_ends_is_no_error(service: ServiceNode) -> None:
     service.destroy_node()
     service.health.on_matched(SimpleNamespace(current_count_change=1))
+
+
+@pytest.mark.timeout(120)
+def test_nothing_is_left_of_reports(
+    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
+    service, peer = make_node("service", kind=ServiceNode), make_node("peer", kind=Node)
+    heard: list[Any] = []
+    peer.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, heard.append, DIAGNOSTICS.qos)
+    spin_until(lambda: heard)  # the report to a new subscriber
+
+    def report() -> None:
+        heard.clear()
+        service.health.drop("subject", "a reason with 1.5")
+        service.health.on_period()
+        spin_until(lambda: heard)
+
+    assert_nothing_is_left(report, lambda: spin_for(0.1))
