@@ -3,6 +3,7 @@ from __future__ import annotations
 from functools import partial
 
 import pytest
+from rclpy.node import Node
 
 from interfaces.service import ServiceNode
 from reactive_node.testing import MakeNode, SpinUntil
@@ -12,6 +13,12 @@ from tests.component.wiring import Connect, Wired
 @pytest.fixture
 def connect(make_node: MakeNode, spin_until: SpinUntil) -> Connect:
     return partial(Wired, make_node, spin_until)
+
+
+@pytest.fixture
+def peer(make_node: MakeNode) -> Node:
+    node: Node = make_node("peer", kind=Node)
+    return node
 
 
 @pytest.fixture

@@ -268,15 +268,6 @@ def test_second_instance_refuses_before_its_first_message(start: Start) -> None:
     assert second.output == ""
 
 
-def test_other_namespace_or_name_is_another_instance(start: Start) -> None:
-    processes = [
-        start("-c", READY, *arguments)
-        for arguments in ([], ["--ros-args", "-r", "__ns:=/arm1"], ["--ros-args", "-r", "__node:=other"])
-    ]
-
-    assert [process.wait_for_line() for process in processes] == ["ready"] * 3
-
-
 @pytest.mark.parametrize(
     ("arguments", "name"),
     [([], "/arm1/ready"), (["--ros-args", "-r", "__ns:=/arm2"], "/arm2/ready")],
@@ -291,14 +282,6 @@ def test_namespace_of_the_environment_is_the_default(
     _, errors = start("-c", READY, *arguments).end()
 
     assert errors.startswith(f"ready: {name} already runs")
-
-
-def test_killed_instance_frees_its_name_at_once(start: Start) -> None:
-    first = start("-c", READY)
-    assert first.wait_for_line() == "ready"
-    first.end(by=signal.SIGKILL)
-
-    assert start("-c", READY).wait_for_line() == "ready"
 
 
 @pytest.mark.parametrize(
@@ -341,17 +324,6 @@ def test_user_error_is_one_line_and_exit_code_2(start: Start, arguments: list[st
     assert re.match(reason, errors)
 
 
-@pytest.mark.parametrize("node", ["robot_state", "/robot_state"])
-def test_mistyped_name_in_the_section_of_a_service_is_refused(
-    start: Start, tmp_path: Path, node: str
-) -> None:
-    file = tmp_path / "parameters.yaml"
-    file.write_text(f"{node}: {{ros__parameters: {{raet: 30.0}}}}\n/other: {{ros__parameters: {{x: 1}}}}")
-    code, errors = start("-m", "services.robot_state", "--ros-args", "--params-file", str(file)).end()
-    assert code == 2
-    assert errors.startswith("robot_state: raet: no such parameter; the parameters are ")
-
-
 @pytest.mark.parametrize(
     "content",
     [
@@ -372,6 +344,11 @@ def test_empty_or_tagged_parameter_file_starts_a_service(start: Start, tmp_path:
     ("content", "reason"),
     [
         ("robot_state: {ros__parameters: {a: {b: 1}}}", "a.b: no such parameter; the parameters are "),
+        (
+            "/x: {ros__parameters: {y: 1}}\nrobot_state: {ros__parameters: {raet: 1}}",
+            "robot_state: raet: no such",
+        ),
+        ("/robot_state: {ros__parameters: {raet: 1}}", "robot_state: raet: no such parameter; "),
         ("/**: {ros__parameters: {a: &a 1, b: *a}}", "line 1"),
         ("robot_state:", "line 1"),
     ],

@@ -24,21 +24,12 @@ from interfaces import topics
 from interfaces.service import Rejected, ServiceNode, parameter
 from interfaces.service.parameters import Declaration
 from reactive_node.stamps import Timestamp, to_nanoseconds
-
-Make = Callable[..., Any]
-SpinUntil = Callable[..., None]
-SpinFor = Callable[[float], None]
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 
 
 def one(name: str, default: Any, within: Any, meaning: str, *, unit: str = "", settable: bool = False) -> Any:
     field = parameter(default, within, unit, meaning, settable=settable)
     return dataclasses.make_dataclass("Parameters", [(name, type(default), field)], frozen=True)
-
-
-@pytest.fixture
-def peer(make_node: Make) -> Node:
-    node: Node = make_node("peer", kind=Node)
-    return node
 
 
 @pytest.fixture
@@ -351,7 +342,7 @@ def test_many_remarks_are_reported_as_four_reasons_and_a_count(
 # Parameters
 
 
-def overridden(make_node: Make, **values: Any) -> ServiceNode:
+def overridden(make_node: MakeNode, **values: Any) -> ServiceNode:
     overrides = [Parameter(name, value=value) for name, value in values.items()]
     node: ServiceNode = make_node("service", kind=ServiceNode, parameter_overrides=overrides)
     return node
@@ -370,7 +361,7 @@ def test_parameter_has_a_description_and_a_range(service: ServiceNode) -> None:
 
 
 @pytest.mark.parametrize("value", [0.5, 100.5, math.nan, math.inf, -math.inf, "fast"])
-def test_value_out_of_range_or_of_another_type_is_refused(make_node: Make, value: float | str) -> None:
+def test_value_out_of_range_or_of_another_type_is_refused(make_node: MakeNode, value: float | str) -> None:
     node = overridden(make_node, rate=value)
     wrong = InvalidParameterTypeException if value == "fast" else InvalidParameterValueException
 
@@ -378,7 +369,7 @@ def test_value_out_of_range_or_of_another_type_is_refused(make_node: Make, value
         node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
 
 
-def test_parameters_are_lists_or_have_no_default(make_node: Make) -> None:
+def test_parameters_are_lists_or_have_no_default(make_node: MakeNode) -> None:
     names, word = one("names", ("a", "b"), None, "of joints"), one("word", Parameter.Type.STRING, None, "")
     assert make_node("default", kind=ServiceNode).declare(names).names == ("a", "b")
     assert make_node("typed", kind=ServiceNode).declare(word).word is None

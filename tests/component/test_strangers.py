@@ -55,11 +55,6 @@ def timed(make_node: MakeNode) -> ServiceNode:
     return node
 
 
-@pytest.fixture
-def peer(make_node: MakeNode) -> Node:
-    return make_node("peer", kind=Node)
-
-
 @pytest.mark.parametrize("type_", [SetParameters, SetParametersAtomically])
 def test_request_with_an_unknown_type_ends_no_service(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, type_: Any

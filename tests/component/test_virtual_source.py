@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import reactivex as rx
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -26,11 +25,8 @@ from interfaces.sources.player import Player
 from interfaces.sources.settings import Settings
 from interfaces.sources.settings_file import SettingsFile
 from interfaces.sources.timeline import Events, Sweep
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from tests.users import NOBODY, needs_root
-
-Make = Callable[..., Any]
-SpinUntil = Callable[..., None]
-SpinFor = Callable[[float], None]
 
 SHORT = 0.1  # [s] in which nothing must happen
 
@@ -43,7 +39,7 @@ class Parameters:
 
 
 @pytest.fixture
-def make_source(make_node: Make) -> Callable[..., ServiceNode]:
+def make_source(make_node: MakeNode) -> Callable[..., ServiceNode]:
     def make(**values: Any) -> ServiceNode:
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         node: ServiceNode = make_node("source", kind=ServiceNode, parameter_overrides=overrides)
@@ -78,27 +74,8 @@ def set_to(node: ServiceNode, name: str, value: Any) -> bool:
 # The scenario
 
 
-def test_without_a_scenario_a_source_follows_its_parameter(make_source: Make, spin_for: SpinFor) -> None:
-    node = make_source(value=3.0)
-    source = Source(node)
-
-    values = emitted(node, source.follow("value", source.player.scenario.configuration.get("l1")))
-    events = emitted(node, source.player.events(source.player.scenario.commands))
-    set_to(node, "value", 4.0)
-    spin_for(SHORT)
-
-    assert (values, events) == ([3.0, 4.0], [])
-
-
-def test_error_in_a_scenario_is_a_user_error(make_source: Make) -> None:
-    node = make_source(scenario="/nowhere.yaml")
-
-    with pytest.raises(UserError, match=r"/nowhere\.yaml"):
-        Source(node)
-
-
 def test_restarted_source_resumes_its_scenario(
-    make_source: Make, tmp_path: Path, spin_until: SpinUntil
+    make_source: MakeNode, tmp_path: Path, spin_until: SpinUntil
 ) -> None:
     path = tmp_path / "scenario.yaml"
     path.write_text("l1: [{at: 0, value: 1}, {at: 100, value: 2}, {at: 101, value: 3}, {at: 999, value: 4}]")
@@ -110,7 +87,7 @@ def test_restarted_source_resumes_its_scenario(
     spin_until(lambda: values == [2.0, 3.0])
 
 
-def test_restarted_source_does_not_repeat_events(make_source: Make, spin_until: SpinUntil) -> None:
+def test_restarted_source_does_not_repeat_events(make_source: MakeNode, spin_until: SpinUntil) -> None:
     node = make_source(scenario_epoch=time.monotonic() - 100.5)
     source = Source(node)
 
@@ -123,7 +100,7 @@ def test_restarted_source_does_not_repeat_events(make_source: Make, spin_until: 
 
 
 def test_source_without_an_origin_starts_its_scenario_at_once(
-    make_source: Make, spin_until: SpinUntil
+    make_source: MakeNode, spin_until: SpinUntil
 ) -> None:
     node = make_source()
     source = Source(node)
@@ -137,7 +114,7 @@ def test_source_without_an_origin_starts_its_scenario_at_once(
 
 @pytest.mark.parametrize("timeline", [Events(((0.0, 2.0),)), Sweep(2.0, 0.0, 1.0)])
 def test_source_emits_nothing_before_its_origin_is_set(
-    make_source: Make, spin_for: SpinFor, spin_until: SpinUntil, timeline: Events[float] | Sweep
+    make_source: MakeNode, spin_for: SpinFor, spin_until: SpinUntil, timeline: Events[float] | Sweep
 ) -> None:
     node = make_source(scenario_epoch=-1.0)
     source = Source(node)
@@ -152,7 +129,7 @@ def test_source_emits_nothing_before_its_origin_is_set(
     spin_until(lambda: (values, pressed, heartbeats) == ([2.0], [True], [True]))
 
 
-def test_no_event_is_lost_when_the_origin_is_set_late(make_source: Make, spin_until: SpinUntil) -> None:
+def test_no_event_is_lost_when_the_origin_is_set_late(make_source: MakeNode, spin_until: SpinUntil) -> None:
     node = make_source(scenario_epoch=-1.0)
     source = Source(node)
     events = emitted(node, source.player.events(Events(((0.0, "a"), (0.3, "b"), (0.7, "c")))))
@@ -163,7 +140,7 @@ def test_no_event_is_lost_when_the_origin_is_set_late(make_source: Make, spin_un
 
 
 def test_source_waits_for_an_origin_to_come(
-    make_source: Make, spin_for: SpinFor, spin_until: SpinUntil
+    make_source: MakeNode, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
     node = make_source(scenario_epoch=-1.0)
     source = Source(node)
@@ -178,7 +155,7 @@ def test_source_waits_for_an_origin_to_come(
     assert time.monotonic() >= origin - 1e-3
 
 
-def test_first_origin_is_final(make_source: Make) -> None:
+def test_first_origin_is_final(make_source: MakeNode) -> None:
     waiting, running = make_source(scenario_epoch=-1.0), make_source(scenario_epoch=7.0)
     Epoch(waiting)
     Epoch(running)
@@ -191,7 +168,7 @@ def test_first_origin_is_final(make_source: Make) -> None:
         assert not set_to(node, EPOCH, -1.0)
 
 
-def test_only_a_source_that_starts_after_the_origin_resumes(make_source: Make) -> None:
+def test_only_a_source_that_starts_after_the_origin_resumes(make_source: MakeNode) -> None:
     now = time.monotonic()
 
     past = [Epoch(make_source(scenario_epoch=epoch)).is_past for epoch in (-1.0, 0.0, now - 0.1, now + 100.0)]
@@ -199,21 +176,10 @@ def test_only_a_source_that_starts_after_the_origin_resumes(make_source: Make) -
     assert past == [False, False, True, False]
 
 
-@pytest.mark.parametrize("ahead", [0.2, -100.0])
-def test_start_waits_for_the_origin(make_source: Make, spin_until: SpinUntil, ahead: float) -> None:
-    origin = time.monotonic() + ahead
-    node = make_source(scenario_epoch=origin)
-
-    begun = emitted(node, Epoch(node).start(rx.defer(lambda _: rx.just(time.monotonic()))))
-
-    spin_until(lambda: begun)
-    assert begun[0] >= origin - 1e-3
-
-
 # Settings: what was set by hand
 
 
-def test_setting_survives_a_restart(make_source: Make, spin_until: SpinUntil, tmp_path: Path) -> None:
+def test_setting_survives_a_restart(make_source: MakeNode, spin_until: SpinUntil, tmp_path: Path) -> None:
     def source() -> tuple[ServiceNode, list[float]]:
         node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path / "settings"))
         return node, emitted(node, Source(node).follow("value", Events(((0.0, 2.0),))))
@@ -231,7 +197,7 @@ def test_setting_survives_a_restart(make_source: Make, spin_until: SpinUntil, tm
 
 
 def test_source_is_given_back_to_its_scenario(
-    make_source: Make, spin_until: SpinUntil, tmp_path: Path
+    make_source: MakeNode, spin_until: SpinUntil, tmp_path: Path
 ) -> None:
     def source() -> tuple[ServiceNode, list[float]]:
         node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path))
@@ -258,7 +224,7 @@ def test_source_is_given_back_to_its_scenario(
 
 
 def test_source_without_a_timeline_is_given_back_to_its_first_value(
-    make_source: Make, spin_until: SpinUntil
+    make_source: MakeNode, spin_until: SpinUntil
 ) -> None:
     node = make_source(value=3.0)
     values = emitted(node, Source(node).follow("value", given_back="follow_scenario"))
@@ -271,7 +237,7 @@ def test_source_without_a_timeline_is_given_back_to_its_first_value(
 
 
 def test_source_that_leaves_its_scenario_keeps_its_parameter(
-    make_source: Make, spin_until: SpinUntil, tmp_path: Path
+    make_source: MakeNode, spin_until: SpinUntil, tmp_path: Path
 ) -> None:
     node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path))
     timeline = Events(((0.0, 2.0),))
@@ -285,7 +251,7 @@ def test_source_that_leaves_its_scenario_keeps_its_parameter(
 
 
 def test_restart_sets_no_parameter(
-    make_source: Make, make_node: Make, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+    make_source: MakeNode, make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
 ) -> None:
     (tmp_path / "source.yaml").write_text("pressed: true")
     events: list[Any] = []
@@ -303,7 +269,7 @@ def test_restart_sets_no_parameter(
     assert not any(each.name == "pressed" for event in events for each in event.changed_parameters)
 
 
-def test_setting_replaces_a_scenario_that_has_not_begun(make_source: Make, spin_for: SpinFor) -> None:
+def test_setting_replaces_a_scenario_that_has_not_begun(make_source: MakeNode, spin_for: SpinFor) -> None:
     node = make_source(scenario_epoch=-1.0)
     pressed = emitted(node, Source(node).follow("pressed", Events(((0.0, True),))))
 
@@ -315,7 +281,7 @@ def test_setting_replaces_a_scenario_that_has_not_begun(make_source: Make, spin_
 
 
 def test_number_that_could_not_be_kept_is_not_taken_for_kept(
-    make_source: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_source: MakeNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = Source(make_source(settings=str(tmp_path / "settings")))
 
@@ -330,7 +296,7 @@ def test_number_that_could_not_be_kept_is_not_taken_for_kept(
 
 
 def test_setting_ends_single_heartbeats_for_good(
-    make_source: Make, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+    make_source: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
 ) -> None:
     def source() -> tuple[ServiceNode, list[int]]:
         node = make_source(settings=str(tmp_path / "settings"))
@@ -352,7 +318,7 @@ def test_setting_ends_single_heartbeats_for_good(
 
 
 @pytest.fixture
-def messages(make_node: Make) -> list[str]:
+def messages(make_node: MakeNode) -> list[str]:
     heard: list[str] = []
     topic = topics.DIAGNOSTICS
     make_node("peer", kind=Node).create_subscription(
@@ -362,7 +328,7 @@ def messages(make_node: Make) -> list[str]:
 
 
 def test_setting_that_cannot_be_kept_is_reported(
-    make_source: Make, messages: list[str], spin_until: SpinUntil, tmp_path: Path
+    make_source: MakeNode, messages: list[str], spin_until: SpinUntil, tmp_path: Path
 ) -> None:
     (tmp_path / "file").touch()
     node = make_source(settings=str(tmp_path / "file" / "settings"))
@@ -377,7 +343,7 @@ def test_setting_that_cannot_be_kept_is_reported(
 
 
 @pytest.fixture
-def restart(make_source: Make, tmp_path: Path, spin_for: SpinFor) -> Callable[[], list[bool]]:
+def restart(make_source: MakeNode, tmp_path: Path, spin_for: SpinFor) -> Callable[[], list[bool]]:
     """Starts a switch that its scenario presses, as the successor of one that died; what it emits."""
 
     def start() -> list[bool]:
@@ -393,7 +359,7 @@ def restart(make_source: Make, tmp_path: Path, spin_for: SpinFor) -> Callable[[]
 
 
 def test_restart_presses_a_switch_that_nobody_has_set(
-    make_source: Make, restart: Callable[[], list[bool]], tmp_path: Path
+    make_source: MakeNode, restart: Callable[[], list[bool]], tmp_path: Path
 ) -> None:
     first = make_source(settings=str(tmp_path / "settings"), scenario_epoch=time.monotonic() + 100.0)
     Source(first).follow("pressed", if_lost=False)
@@ -419,7 +385,7 @@ def test_late_first_start_is_no_restart(restart: Callable[[], list[bool]], tmp_p
 
 
 def test_setting_that_cannot_be_kept_leaves_no_old_one(
-    make_source: Make, restart: Callable[[], list[bool]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_source: MakeNode, restart: Callable[[], list[bool]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = make_source(settings=str(tmp_path / "settings"))
     emitted(node, Source(node).follow("pressed"))
@@ -433,7 +399,7 @@ def test_setting_that_cannot_be_kept_leaves_no_old_one(
 
 
 @needs_root
-def test_settings_of_another_user_are_refused(make_source: Make, tmp_path: Path) -> None:
+def test_settings_of_another_user_are_refused(make_source: MakeNode, tmp_path: Path) -> None:
     node = make_source(settings=str(tmp_path / "settings"))
     (tmp_path / "settings").mkdir()
     (tmp_path / "settings" / "source.yaml").write_text("pressed: true\n")
@@ -448,7 +414,7 @@ def full_disk(*arguments: Any) -> None:
 
 
 def test_lost_settings_are_reported(
-    make_source: Make, messages: list[str], spin_until: SpinUntil, tmp_path: Path
+    make_source: MakeNode, messages: list[str], spin_until: SpinUntil, tmp_path: Path
 ) -> None:
     node = make_source(settings=str(tmp_path), scenario_epoch=time.monotonic() - 1.0)
 
@@ -458,7 +424,7 @@ def test_lost_settings_are_reported(
 
 
 @pytest.mark.parametrize("text", ["", "- 1", "value: [", "value: -1.0", "value: long"])
-def test_bad_setting_is_an_error_and_not_forgotten(make_source: Make, tmp_path: Path, text: str) -> None:
+def test_bad_setting_is_an_error_and_not_forgotten(make_source: MakeNode, tmp_path: Path, text: str) -> None:
     node = make_source(settings=str(tmp_path))
     (tmp_path / "source.yaml").write_text(text)
 
