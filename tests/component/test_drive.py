@@ -328,15 +328,3 @@ def test_joint_plays_no_time_that_waited(
 
     joint.spin_until(lambda: joint.service.health.dropped)
     assert angles(joint) == []
-
-
-def test_joint_that_is_set_by_hand_is_given_back_to_the_drive(
-    start: Callable[..., Wired], spin_until: SpinUntil
-) -> None:
-    joint = start_joint(start)
-    joint.service.set_parameters([Parameter("value", value=0.5)])
-    spin_until(lambda: angles(joint) == [0.5])
-    joint.service.set_parameters([Parameter("follow_scenario", value=True)])
-    publish_time(joint, 2.0)
-
-    spin_until(lambda: angles(joint)[-1] == pytest.approx(1.0))

@@ -107,34 +107,30 @@ def test_state_of_velocities_only_is_no_bad_state() -> None:
     assert angles(*states, until=0.9) == [(0.2, 2.0), (0.4, 4.0)]
 
 
-def test_silence_reports_that_states_have_no_positions() -> None:
-    reason = "elbow: no angle for 1 s: the states have elbow (without position)"
-    assert angles((0.5, bare(0.5, "elbow")), until=1.4) == [(1.0, reason)]
-
-
-def test_silence_reports_that_states_have_no_names() -> None:
-    found = angles((0.5, bare(0.5, positions=[1.0])), until=1.4)
-    assert found == [(1.0, "elbow: no angle for 1 s: the states have no names")]
-
-
 def test_state_with_too_few_positions_is_rejected() -> None:
     found = angles((0.5, bare(0.5, "wrist", "elbow", positions=[1.0])), until=0.9)
     assert found == [(0.5, "elbow: 2 names and 1 positions")]
 
 
+def named(*names: str) -> JointState:
+    return state(0.5, *((name, 1.0) for name in names))
+
+
 @pytest.mark.parametrize(
-    ("names", "shown"),
+    ("robot", "shown"),
     [
-        (["left/elbow", "left/wrist"], "left/elbow, left/wrist; is it left/elbow?"),
-        (["ur_elbow", "b_elbow"], "b_elbow, ur_elbow; is it b_elbow, ur_elbow?"),
-        (["wrist"], "wrist"),
-        ([f"j{n}" for n in range(10)], "j0, j1, j2, j3, j4, j5, j6, j7 and 2 more"),
-        (["x" * 100_000], "x" * 40),
+        (bare(0.5, "elbow"), "elbow (without position)"),
+        (bare(0.5, positions=[1.0]), "no names"),
+        (named("left/elbow", "left/wrist"), "left/elbow, left/wrist; is it left/elbow?"),
+        (named("ur_elbow", "b_elbow"), "b_elbow, ur_elbow; is it b_elbow, ur_elbow?"),
+        (named("wrist"), "wrist"),
+        (named(*(f"j{n}" for n in range(10))), "j0, j1, j2, j3, j4, j5, j6, j7 and 2 more"),
+        (named("x" * 100_000), "x" * 40),
     ],
+    ids=lambda it: it[:30] if isinstance(it, str) else "state",
 )
-def test_silence_reports_the_names_that_the_robot_has(names: list[str], shown: str) -> None:
-    prefixed = state(0.5, *((name, 1.0) for name in names))
-    assert angles((0.5, prefixed), until=1.4) == [(1.0, f"elbow: no angle for 1 s: the states have {shown}")]
+def test_silence_reports_the_names_that_the_robot_has(robot: JointState, shown: str) -> None:
+    assert angles((0.5, robot), until=1.4) == [(1.0, f"elbow: no angle for 1 s: the states have {shown}")]
 
 
 ARM, SAME, HAND = ("elbow", "wrist"), ("wrist", "elbow"), ("finger",)
