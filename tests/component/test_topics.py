@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header, String
 
@@ -122,29 +122,6 @@ def test_configuration_is_the_four_sources() -> None:
     assert list(topics.CONFIGURATION.items()) == [
         (topic.name, topic) for topic in (topics.L1, topics.L2, topics.THETA1, topics.THETA2)
     ]
-
-
-@pytest.mark.parametrize("topic", topics.CONTRACT, ids=lambda topic: topic.name)
-def test_qos_is_the_described_one(topic: Topic) -> None:
-    described = topics.describe(topic.qos).split(", ")
-
-    assert ("reliable" in described) == (topic.qos.reliability == ReliabilityPolicy.RELIABLE)
-    assert ("best effort" in described) == (topic.qos.reliability == ReliabilityPolicy.BEST_EFFORT)
-    assert ("transient local" in described) == (topic.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
-    assert ("volatile" in described) == (topic.qos.durability == DurabilityPolicy.VOLATILE)
-    assert f"last {topic.qos.depth}" in described
-    lifespans = [each for each in described if each.startswith("lifespan")]
-    nanoseconds = topic.qos.lifespan.nanoseconds
-    assert lifespans == ([] if nanoseconds == 0 else [_lifespan(nanoseconds)])
-    assert topics.is_latched(topic.qos) == ("transient local" in described)
-
-
-def _lifespan(nanoseconds: int) -> str:
-    return (
-        f"lifespan {nanoseconds // 10**9} s"
-        if nanoseconds >= 10**9
-        else f"lifespan {nanoseconds // 10**6} ms"
-    )
 
 
 @pytest.mark.parametrize(
