@@ -120,10 +120,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/supervision/test_parameter_file.py",
     ),
     "interfaces/service/process.py": ("tests/component/test_service_life.py",),
-    f"{REACTIVE_NODE}/scheduler.py": (
-        f"{_NODE_TESTS}/test_scheduler_limits.py",
-        f"{_NODE_TESTS}/test_scheduler.py",
-    ),
+    f"{REACTIVE_NODE}/scheduler.py": (f"{_NODE_TESTS}/test_scheduler.py",),
     f"{REACTIVE_NODE}/stamps.py": (f"{_NODE_TESTS}/test_stamps.py",),
     f"{REACTIVE_NODE}/node.py": tuple(
         f"{_NODE_TESTS}/test_{name}.py"
