@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -14,14 +16,10 @@ from rclpy.node import Node
 from rclpy.task import Future
 from reactivex.abc import DisposableBase
 
+from interfaces.reactive_node.tests.fibonacci import Fibonacci
 from reactive_node import ReactiveNode
 from reactive_node.actions import GoalAborted, GoalCanceled, GoalRejected, GoalUnknown
 from reactive_node.testing import SpinFor, SpinUntil
-
-try:
-    from example_interfaces.action import Fibonacci
-except ModuleNotFoundError:  # ROS 2's wheels
-    from test_msgs.action import Fibonacci
 
 
 class Server:
@@ -296,3 +294,11 @@ def test_each_subscription_sends_a_goal(node: ReactiveNode, server: Server, spin
     spin_until(lambda: len(first.items) == len(second.items) == 2)
 
     assert server.goals == [7, 7]
+
+
+def test_node_without_actions_does_not_import_them() -> None:
+    program = "import reactive_node, sys; print([name for name in sys.modules if 'rclpy.action' in name])"
+
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+
+    assert run.stdout == "[]\n"

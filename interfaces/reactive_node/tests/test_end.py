@@ -11,13 +11,8 @@ from reactivex.subject import Subject
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
+from interfaces.reactive_node.tests.fibonacci import Fibonacci
 from reactive_node import ReactiveNode
-
-try:
-    from example_interfaces.action import Fibonacci
-except ModuleNotFoundError:  # ROS 2's wheels
-    from test_msgs.action import Fibonacci
-
 
 Create = Callable[[ReactiveNode], Observable[object]]
 OBSERVABLES: dict[str, Create] = {

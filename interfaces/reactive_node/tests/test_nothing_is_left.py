@@ -18,16 +18,12 @@ from rclpy.task import Future
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 
+from interfaces.reactive_node.tests.fibonacci import Fibonacci
 from interfaces.reactive_node.tests.leftovers import assert_nothing_is_left
 from reactive_node import ReactiveNode
 from reactive_node.actions import GoalUnknown
 from reactive_node.executor import create_executor
 from reactive_node.testing import SpinFor, SpinUntil
-
-try:
-    from example_interfaces.action import Fibonacci
-except ModuleNotFoundError:  # ROS 2's wheels
-    from test_msgs.action import Fibonacci
 
 PEERS = 30  # in a round: each takes 0.1 s
 IS_KILTED = hasattr(rclpy_implementation, "TimerCancelledError")

@@ -19,24 +19,28 @@ from rclpy.node import Node
 from std_msgs.msg import Bool, Float64, Int64, String
 from std_srvs.srv import SetBool
 
+from interfaces.reactive_node.tests.fibonacci import Fibonacci
 from reactive_node.testing import MakeNode, SpinUntil
 
-try:
-    from example_interfaces.action import Fibonacci
-except ModuleNotFoundError:  # ROS 2's wheels
-    from test_msgs.action import Fibonacci
+PROJECT = Path(__file__).parents[1]
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-README = README.replace("example_interfaces", Fibonacci.__module__.partition(".")[0])
-BLOCKS = re.findall(r"^```python\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+
+def blocks(page: str) -> list[str]:
+    """Return the programs that a page shows."""
+    text = (PROJECT / page).read_text(encoding="utf-8")
+    text = text.replace("example_interfaces", Fibonacci.__module__.partition(".")[0])
+    return re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+
+
+BLOCKS = blocks("README.md")
 NAME = re.compile(r"# (\w+\.py)\n")
 """The first line of a block that is a file, or a part of an example."""
-EXAMPLES = {path.name: path.read_text() for path in Path(__file__).parents[1].glob("examples/*.py")}
+EXAMPLES = {path.name: path.read_text() for path in PROJECT.glob("examples/*.py")}
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    shown = {name[1]: block for block in BLOCKS if (name := NAME.match(block))}
+    shown = {name[1]: block for block in [*BLOCKS, *blocks("SIGNALS.md")] if (name := NAME.match(block))}
     for name, text in (shown | EXAMPLES).items():
         (tmp_path / name).write_text(text)
     return tmp_path
@@ -149,11 +153,11 @@ def test_program_publishes_alarm_until_signal(
     assert (program.returncode, errors) == (0, "")
 
 
-def test_virtual_time_test_passes(files: Path) -> None:
+def test_tests_of_both_pages_pass(files: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--rootdir={files}", files]
     environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
 
     run = subprocess.run(command, cwd=files, env=environment, capture_output=True, text=True)
 
     assert run.returncode == 0, run.stdout
-    assert run.stdout.splitlines()[-1].startswith("3 passed")
+    assert run.stdout.splitlines()[-1].startswith("6 passed")
