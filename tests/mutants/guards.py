@@ -153,7 +153,6 @@ GUARDS: dict[str, tuple[str, ...]] = {
     f"{REACTIVE_NODE}/signals/run.py": (_OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/questions.py": (_OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/signal.py": (_OPERATIONS, _SAMPLES),
-    f"{REACTIVE_NODE}/signals/crossings.py": (_OPERATIONS,),
     f"{REACTIVE_NODE}/signals/integral.py": (_OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/replay.py": (_RUNS,),
     f"{REACTIVE_NODE}/signals/values.py": (_SAMPLES, _OPERATIONS),

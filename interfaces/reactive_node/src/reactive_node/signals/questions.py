@@ -1,4 +1,4 @@
-"""The times for which a signal is asked: those of events, or all multiples of a period."""
+"""The times for which a signal is asked: those of events, all multiples of a period, changes in between."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 from reactivex import Observable
 
-from reactive_node.signals.answers import Answer, Refused
+from reactive_node.signals.answers import CERTAIN, Answer, Refused
 from reactive_node.signals.run import Node, Run
 from reactive_node.signals.source import Source
-from reactive_node.stamps import Timestamp
+from reactive_node.stamps import Timestamp, stamped
 
 
 class Grid:
@@ -23,7 +23,6 @@ class Grid:
         self.restart(run.now())
 
     def answer(self, horizon: int) -> None:
-        """Answer what is asked up to a time [ns]."""
         while self._next <= horizon:
             time, self._next = self._next, self._next + self._period
             value, mark = self._node.at(time)
@@ -67,7 +66,6 @@ class Events(Source):
         self._asked.append((time, value))
 
     def answer(self, horizon: int) -> None:
-        """Answer what is asked up to a time [ns]."""
         while self._asked and self._asked[0][0] <= horizon:
             time, event = self._asked.popleft()
             value, mark = self._node.at(time)
@@ -87,3 +85,39 @@ class Events(Source):
         """Ask from another time on [ns]: the clock was set."""
         super().restart(now)
         self._asked.clear()
+
+
+class Crossings:
+    """Finds the times at which a predicate changes, between those at which answers come in their order."""
+
+    def __init__(
+        self,
+        node: Node,
+        predicate: Callable[[Any], bool],
+        period: int,
+        emit: Callable[[Timestamp[bool]], None],
+    ) -> None:
+        """The answers are a period [ns] apart; the predicate was false before."""
+        self._node, self._predicate, self._period, self._emit = node, predicate, period, emit
+        self._was_true = False
+
+    def look(self, answer: Answer[Any]) -> None:
+        """Compare an answer with the one before."""
+        if answer.mark == CERTAIN:
+            is_true = bool(self._predicate(answer.value))
+            if is_true != self._was_true:
+                time = self._change(answer.time)
+                self._was_true = is_true
+                self._emit(stamped(is_true, time))
+
+    def _change(self, after: int) -> int:
+        """Return the time of the change before a time, by bisection: to the nanosecond [ns]."""
+        before = after - self._period
+        while after - before > 1:
+            middle = (before + after) // 2
+            value, mark = self._node.at(middle)
+            if mark == CERTAIN and bool(self._predicate(value)) != self._was_true:
+                after = middle
+            else:
+                before = middle
+        return after

@@ -13,9 +13,8 @@ from reactivex import Observable
 
 from reactive_node.signals import values
 from reactive_node.signals.answers import CERTAIN, HELD, UNKNOWN, Answer, Refused
-from reactive_node.signals.crossings import Crossings
 from reactive_node.signals.integral import Integral
-from reactive_node.signals.questions import Events, Grid
+from reactive_node.signals.questions import Crossings, Events, Grid
 from reactive_node.signals.run import Node, Run, evaluation
 from reactive_node.signals.source import SECOND, nanoseconds
 from reactive_node.stamps import Timestamp
@@ -201,14 +200,20 @@ def switch(key: Signal[K], choices: Mapping[K, Signal[T]]) -> Signal[T]:
     )
 
 
-class _Lifted:
-    def __init__(self, function: Callable[..., Any], nodes: list[Node]) -> None:
-        self._function, self._nodes = function, nodes
-        self._reads = [node.at for node in nodes]
+class _Several:
+    def __init__(self, *nodes: Node) -> None:
+        self._nodes = nodes
 
     def needs(self, low: int, high: int) -> None:
         for node in self._nodes:
             node.needs(low, high)
+
+
+class _Lifted(_Several):
+    def __init__(self, function: Callable[..., Any], nodes: list[Node]) -> None:
+        super().__init__(*nodes)
+        self._function = function
+        self._reads = [node.at for node in nodes]
 
     def at(self, time: int) -> tuple[Any, int]:
         arguments, worst = [], CERTAIN
@@ -243,15 +248,6 @@ class _OfTime:
 
     def at(self, time: int) -> tuple[Any, int]:
         return self._function(time), CERTAIN
-
-
-class _Several:
-    def __init__(self, *nodes: Node) -> None:
-        self._nodes = nodes
-
-    def needs(self, low: int, high: int) -> None:
-        for node in self._nodes:
-            node.needs(low, high)
 
 
 class _Until(_Several):
