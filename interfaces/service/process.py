@@ -31,7 +31,6 @@ from interfaces.service.errors import UserError
 from interfaces.service.node import ServiceNode
 from reactive_node.executor import create_executor
 
-"""Environment variable: the default namespace of every service; ``--ros-args -r __ns:=…`` wins."""
 SUPERVISED = "SUPERVISOR_PROCESS_NAME"
 """Environment variable: the name that supervisord gives to a program."""
 USER_ERRORS = (NameValidationException, ParameterException, UserError)
