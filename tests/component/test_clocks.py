@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import socket
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -16,6 +17,7 @@ from interfaces.service import ServiceNode, clocks
 from interfaces.service.clocks import MOST_HOSTS, Clocks
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinUntil
+from services import drive, engine_controller, operator_watchdog
 from tests import health_reports
 
 
@@ -153,3 +155,15 @@ def test_first_comparison_ends_the_wait(age: float, words: str) -> None:
         assert found.refusal() == "the clocks of the hosts are not compared yet"
         found.hear(report(age))
     assert found.refusal() == words
+
+
+@pytest.mark.parametrize(
+    "wire", [operator_watchdog.wire, engine_controller.wire, drive.wire], ids=["F1", "F2", "F3"]
+)
+def test_no_fail_safe_reads_reports_of_health(
+    make_node: MakeNode, wire: Callable[[ServiceNode], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(manifest.HOST, raising=False)
+    node = make_node("service", kind=ServiceNode)
+    wire(node)
+    assert DIAGNOSTICS.name not in {each.topic_name for each in node.subscriptions}

@@ -118,6 +118,20 @@ def test_event_that_comes_too_late_is_rejected_and_turns_off() -> None:
     assert engines == OFF
 
 
+@pytest.mark.parametrize("refusal", ["", "one is wrong"])
+def test_comparison_of_clocks_keeps_no_engines_on(refusal: str) -> None:
+    """With two hosts, reports of health show their clocks: the controller may only refuse `turn_on`."""
+    assert step(refusing(ON_AND_SEEN, refusal), command(TURN_OFF)).engines == OFF
+    for event in (TICK, command(TURN_ON), Comparison(at_time(NOW), refusal)):
+        assert step(refusing(latch(ON, 90.0, NOW), refusal), event).engines == OFF
+
+
+def test_comparison_of_clocks_turns_no_engines_on() -> None:
+    compared = step(latch(OFF, None, NOW), Comparison(at_time(NOW), ""))
+    assert compared.engines == OFF
+    assert step(compared, command(TURN_ON)).engines == OFF
+
+
 class Engines:
     """The recipe between a virtual operator and a list of states, with a wall clock that can be set."""
 
