@@ -1,11 +1,9 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import math
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,7 +21,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 from interfaces import topics
 from interfaces.service import Rejected, ServiceNode, parameter
 from interfaces.service.parameters import Declaration
-from reactive_node.stamps import Timestamp, to_nanoseconds
+from reactive_node.stamps import Timestamp
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 
 
@@ -220,74 +218,35 @@ def heard_speeds(
     return heard
 
 
-def test_bad_messages_are_not_published(
+@pytest.mark.parametrize(
+    ("item", "message"),
+    [
+        (math.inf, "effector/speed: inf is not finite"),
+        (Rejected(topics.EFFECTOR_POSITION, "it stands still"), "effector/position: it stands still"),
+    ],
+    ids=["bad", "rejected"],
+)
+def test_bad_or_rejected_item_is_reported_instead_of_published(
     speeds: Subject[float | Rejected],
     heard_speeds: list[float],
     spin_until: SpinUntil,
     health: Callable[[], dict[str, Any]],
+    item: float | Rejected,
+    message: str,
 ) -> None:
     assert health()["seconds_since_output"] == ""
-    for speed in (math.inf, 1.0, 2.0):
+    for speed in (item, 1.0, 2.0):
         speeds.on_next(speed)
     spin_until(lambda: heard_speeds == [1.0, 2.0])
 
     report = health()
-    assert report["message"] == "effector/speed: inf is not finite"
+    assert report["message"] == message
     assert (report["published"], report["dropped"]) == ("2", "1")
     assert 0 <= float(report["seconds_since_output"]) < 5
 
 
-def test_rejected_items_are_reported_instead_of_published(
-    speeds: Subject[float | Rejected],
-    heard_speeds: list[float],
-    spin_until: SpinUntil,
-    health: Callable[[], dict[str, Any]],
-) -> None:
-    for item in (Rejected(topics.EFFECTOR_POSITION, "its time stands still"), 1.0):
-        speeds.on_next(item)
-    spin_until(lambda: heard_speeds == [1.0])
-
-    report = health()
-    assert report["message"] == "effector/position: its time stands still"
-    assert (report["published"], report["dropped"]) == ("1", "1")
-
-
-class Readers:
-    """Stands in for the DDS readers of a service: all receive the same samples."""
-
-    def __init__(self, node: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.alive: list[SimpleNamespace] = []
-        monkeypatch.setattr(node, "create_subscription", self._create)
-        monkeypatch.setattr(node, "destroy_subscription", self.alive.remove)
-
-    def _create(self, _: Any, __: Any, callback: Any, *___: Any, **____: Any) -> SimpleNamespace:
-        self.alive.append(SimpleNamespace(callback=callback))
-        return self.alive[-1]
-
-    def receive(self, message: Any, at: float) -> None:
-        info = {"source_timestamp": to_nanoseconds(at_time(at))}
-        for callback in [reader.callback for reader in self.alive]:
-            takes_info = len(inspect.signature(callback).parameters) == 2
-            callback(bytes(serialize_message(message)), *[info] * takes_info)
-
-
 def at_time(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
-
-
-@pytest.fixture
-def readers(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> Readers:
-    return Readers(service, monkeypatch)
-
-
-@pytest.mark.parametrize("topic", [topics.EFFECTOR_SPEED, topics.L1], ids=lambda topic: topic.name)
-def test_items_are_the_good_values(service: ServiceNode, readers: Readers, topic: topics.Topic) -> None:
-    received: list[Any] = []
-    service.observe(topic).subscribe(received.append)
-    service.observe(topic, timestamped=True).subscribe(received.append)
-    for data in (1.5, math.nan, 2.0):
-        readers.receive(number(data), 7.0)
-    assert received == [1.5, Timestamp(1.5, at_time(7.0)), 2.0, Timestamp(2.0, at_time(7.0))]
 
 
 @pytest.mark.parametrize(
