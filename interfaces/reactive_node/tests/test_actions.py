@@ -183,13 +183,6 @@ def test_goal_that_another_client_cancels_is_error_with_result(
     assert server.cancelled == [7]
 
 
-def test_goal_of_wrong_type_is_error(node: ReactiveNode, server: Server, spin_until: SpinUntil) -> None:
-    watch = Watch(node.create_action_call(Fibonacci, "fibonacci")("no goal"), node)
-    spin_until(lambda: watch.errors)
-
-    assert isinstance(watch.errors[0], TypeError)
-
-
 def test_goal_that_server_has_forgotten_is_error(
     node: ReactiveNode, peer: Node, spin_until: SpinUntil
 ) -> None:

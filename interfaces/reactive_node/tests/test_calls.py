@@ -89,16 +89,6 @@ def test_call_without_response_ends_in_timeout_error(node: ReactiveNode, spin_un
     assert thread == threading.get_ident()
 
 
-def test_call_with_wrong_request_type_is_error(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
-    peer.create_service(SetBool, "switch", answer)
-    errors: list[Exception] = []
-
-    node.create_call(SetBool, "switch")("no request").subscribe(on_error=errors.append)
-    spin_until(lambda: errors)
-
-    assert isinstance(errors[0], TypeError)
-
-
 def test_abandoned_call_emits_nothing(
     node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:

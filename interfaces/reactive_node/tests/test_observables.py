@@ -4,7 +4,6 @@ import gc
 import threading
 import weakref
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
@@ -16,7 +15,7 @@ from reactivex.abc import DisposableBase
 from reactivex.subject import AsyncSubject
 from std_msgs.msg import String
 
-from reactive_node import ReactiveNode, Timestamp
+from reactive_node import ReactiveNode
 from reactive_node.shared_reader import SharedReader
 from reactive_node.testing import SpinFor, SpinUntil
 
@@ -206,21 +205,6 @@ def test_reader_that_is_gone_waits_for_no_end_of_the_node(node: ReactiveNode, sp
     assert len(end.observers) == 1
     subscription.dispose()
     assert end.observers == []
-
-
-def test_timestamped_items_carry_source_time(
-    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
-) -> None:
-    received: list[Timestamp[String]] = []
-    node.create_observable(String, "topic", timestamped=True).subscribe(received.append)
-
-    before = datetime.now(UTC)
-    talker.say_when_heard("hello")
-    after = datetime.now(UTC)
-    spin_until(lambda: received)
-
-    assert received[0].value == String(data="hello")
-    assert before - timedelta(microseconds=1) <= received[0].timestamp <= after
 
 
 def test_invalid_message_type_is_error_of_observable(node: ReactiveNode) -> None:

@@ -2,14 +2,11 @@ from __future__ import annotations
 
 import gc
 import weakref
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 import reactivex as rx
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
-from reactivex.abc import DisposableBase
 from reactivex.disposable import Disposable
 from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
@@ -59,12 +56,6 @@ def test_publisher_lives_from_wiring_until_disposal(
     spin_until(lambda: peer.count_publishers("numbers") == 0)
 
 
-def test_publisher_on_demand_takes_no_other_event_callbacks(node: ReactiveNode) -> None:
-    events = PublisherEventCallbacks()
-    with pytest.raises(TypeError, match="event_callbacks"):
-        node.publish_observable(rx.never(), Float64, "numbers", on_demand=True, event_callbacks=events)
-
-
 def test_observable_on_demand_is_observed_while_there_are_subscribers(
     node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:
@@ -94,18 +85,8 @@ def test_observable_on_demand_is_observed_while_there_are_subscribers(
     assert happened == ["observed", "disposed"]
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda node: node.publish_observable(rx.never(), Float64, "numbers"),
-        lambda node: node.serve_recipe(lambda requests: requests.ignore_elements(), SetBool, "switch"),
-    ],
-    ids=["publisher", "service"],
-)
-def test_publisher_and_service_are_forgotten_after_disposal(
-    node: ReactiveNode, make: Callable[[ReactiveNode], DisposableBase]
-) -> None:
-    sink = make(node)
+def test_service_is_forgotten_after_disposal(node: ReactiveNode) -> None:
+    sink = node.serve_recipe(lambda requests: requests.ignore_elements(), SetBool, "switch")
     disposed = weakref.ref(sink)
 
     sink.dispose()

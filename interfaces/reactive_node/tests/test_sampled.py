@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from datetime import UTC, datetime, timedelta
 from functools import partial
 from typing import Any
 from unittest import mock
@@ -122,21 +121,6 @@ def test_period_ticks_at_once_and_by_the_scheduler_of_the_node(
     assert reads == pytest.approx([0.0, 0.2, 0.4])
 
 
-def test_message_comes_with_its_source_time(
-    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
-) -> None:
-    received: list[Any] = []
-    node.create_sampled_observable(Float64, "topic", ticks, timestamped=True).subscribe(received.append)
-    talker.await_readers(2)
-    before = datetime.now(UTC)
-    talker.say(1.0)
-    after = datetime.now(UTC)
-    time.sleep(0.05)
-    spin_until(lambda: ticks.on_next(NOW) or received)
-    assert received[0].value == Float64(data=1.0)
-    assert before - timedelta(milliseconds=1) <= received[0].timestamp <= after
-
-
 def test_observers_share_a_reader_that_ends_with_the_last(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
@@ -230,16 +214,6 @@ def test_reader_that_cannot_be_created_is_an_error_of_each_observer(
 def test_period_must_be_a_positive_number(node: ReactiveNode, how: str, period: float) -> None:
     with pytest.raises(ValueError, match=f"^topic: a period of {period} s is no positive number$"):
         getattr(node, f"create_{how}_observable")(Float64, "topic", period)
-
-
-@pytest.mark.parametrize("option", ["callback_group", "event_callbacks"])
-def test_options_that_would_attend_the_reader_are_refused(
-    node: ReactiveNode, ticks: Subject[None], option: str
-) -> None:
-    errors: list[Exception] = []
-    topic = node.create_sampled_observable(Float64, "topic", ticks, **{option: mock.Mock()})
-    topic.subscribe(on_error=errors.append)
-    assert option in str(errors[0])
 
 
 def test_other_thread_may_dispose_while_it_is_read(node: ReactiveNode, talker: Talker) -> None:
