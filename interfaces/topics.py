@@ -213,22 +213,6 @@ def _not_a_length(value: float) -> str:
     return _not_usable(value) or ("" if value >= 0 else f"{value} is negative")
 
 
-def _not_a_driven_time(driven: DrivenTime) -> str:
-    return _not_a_length(driven.seconds)
-
-
-def _not_a_position(position: Position) -> str:
-    return _not_usable(position.x, position.y)
-
-
-def _not_a_twist(twist: PlanarTwist) -> str:
-    return _not_usable(twist.x, twist.y, twist.turn)
-
-
-def _not_pressed(beat: bool) -> str:
-    return "" if beat else "a released switch is no sign of life"
-
-
 def _not_a_name(name: str) -> str:
     return "" if 0 < len(name) <= LONGEST_NAME else f"{name[:40]!r} is no name of a node"
 
@@ -278,7 +262,7 @@ DRIVEN_TIME = Topic(
     ("config_theta1", "config_theta2", *OPERATOR_NODES),
     "`time_ref`: for how long the drive has moved the joints; only in a scenario with a drive, by which they "
     "then move. `source`: the host of the drive. A joint follows that of its own host, and reports others",
-    _not_a_driven_time,
+    lambda driven: _not_a_length(driven.seconds),
 )
 THETA1 = Topic(
     "theta1",
@@ -310,7 +294,7 @@ EFFECTOR_POSITION = Topic(
     ("kinematics",),
     ("velocity", *OPERATOR_NODES),
     f"x, y in frame `{FRAME}`; `header.stamp` is the time of emission",
-    _not_a_position,
+    lambda position: _not_usable(position.x, position.y),
 )
 EFFECTOR_SPEED = Topic(
     "effector/speed",
@@ -332,7 +316,7 @@ EFFECTOR_TWIST = Topic(
     ("operator_page",),
     f"x, y and the turn about z in frame `{FRAME}`, at 50 Hz; true at the time in `header.stamp`. "
     "Silent while it is unknown: where a movement begins or ends, and while a source is dead",
-    _not_a_twist,
+    lambda twist: _not_usable(twist.x, twist.y, twist.turn),
     longest_gap=math.inf,
 )
 JOINT_STATES = Topic(
@@ -373,7 +357,7 @@ OPERATOR_HEARTBEAT = Topic(
     ("operator_watchdog", *OPERATOR_NODES),
     "`true` while the switch is pressed, at 20 Hz or much faster. Neither `false` nor a heartbeat that "
     "waited in a queue is a sign of life",
-    _not_pressed,
+    lambda beat: "" if beat else "a released switch is no sign of life",
 )
 OPERATOR_HAND = Topic(
     "operator_hand",

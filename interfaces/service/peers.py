@@ -61,9 +61,10 @@ class Peers:
         types = self._node.topic_types()
         for name, topic in self._inputs.items():
             if types.get(name) != [topic.type_name]:  # to ask for each topic's publishers would cost more
-                for it in _of_other_types(self._node.publishers_of(name), topic):
-                    what = f"{self._shown(it)} publishes {it.type or 'another type'}"
-                    yield real_name(self._node, topic), what
+                for it in self._node.publishers_of(name):
+                    if it.type != topic.type_name:
+                        what = f"{self._shown(it)} publishes {it.type or 'another type'}"
+                        yield real_name(self._node, topic), what
         matched = {it.topic_name: it.get_subscription_count() for it in self._node.publishers}
         for name, topic in self._outputs.items():
             if self._node.count_subscribers(name) > matched.get(name, 0):  # their details would cost more
@@ -136,10 +137,6 @@ def _mismatch(subscriber: Endpoint, topic: Topic) -> str:
     if wanted.durability == Durability.TRANSIENT_LOCAL and given.durability == Durability.VOLATILE:
         return "a transient local publisher"
     return ""
-
-
-def _of_other_types(endpoints: Iterable[Endpoint], topic: Topic) -> Iterator[Endpoint]:
-    return (endpoint for endpoint in endpoints if endpoint.type != topic.type_name)
 
 
 def _type_name(srv_type: Any) -> str:
