@@ -136,40 +136,28 @@ def obedient_driver(make_node: MakeNode) -> list[bool]:
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
-def test_service_follows_the_engines_and_is_off_at_the_end(
-    connect: Connect, make_node: MakeNode, spin_until: SpinUntil
-) -> None:
-    asked = obedient_driver(make_node)
-    wired = start(connect, service="motor")
-    spin_until(lambda: asked[-1:] == [False])
-
-    def turned_on() -> bool:
-        wired.publish(ENGINES_STATE, String(data=ON))
-        return asked[-1]
-
-    spin_until(turned_on)
-    spin_until(lambda: not asked[-1])
-    spin_until(turned_on)
-    count = len(asked)
-    wired.service.destroy_node()
-    spin_until(lambda: len(asked) > count and not asked[-1])
-
-
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
-def test_file_and_service_follow_the_engines_together(
+def test_service_and_file_follow_the_engines_and_are_off_at_the_end(
     connect: Connect, make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path
 ) -> None:
     pin = tmp_path / "value"
     pin.write_text("1\n")
     asked = obedient_driver(make_node)
-    wired = start(connect, file=str(pin), service="motor")
-    spin_until(lambda: (asked[-1:], pin.read_text()) == ([False], "0\n"))
+    wired = start(connect, service="motor", file=str(pin))
+
+    def are(on: bool) -> bool:
+        return (asked[-1:], pin.read_text()) == ([on], f"{on:d}\n")
 
     def turned_on() -> bool:
         wired.publish(ENGINES_STATE, String(data=ON))
-        return (asked[-1], pin.read_text()) == (True, "1\n")
+        return are(True)
 
+    spin_until(lambda: are(False))
     spin_until(turned_on)
+    spin_until(lambda: are(False))
+    spin_until(turned_on)
+    count = len(asked)
+    wired.service.destroy_node()
+    spin_until(lambda: len(asked) > count and are(False))
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
