@@ -171,25 +171,18 @@ def test_each_report_has_the_rate_of_the_heartbeats(
     spin_until(lambda: switch.reports()[-1].get("parameter rate") == "9.0")
 
 
-def with_one_heartbeat(connect: Connect, tmp_path: Path, at: float) -> Wired:
-    """Return a switch whose scenario sends one heartbeat at a time [s], and has not begun."""
-    scenario = tmp_path / "scenario.yaml"
-    scenario.write_text(f"operator: {{heartbeats: [{at}]}}\n")
-    return connect(wire, outputs=[OPERATOR_HEARTBEAT], scenario=str(scenario), scenario_epoch=-1.0)
-
-
-def test_scenario_sends_single_heartbeats(connect: Connect, spin_until: SpinUntil, tmp_path: Path) -> None:
-    switch = with_one_heartbeat(connect, tmp_path, 0.3)
-    switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
-    spin_until(lambda: switch.heard[OPERATOR_HEARTBEAT.name])
-    assert [each.data for each in switch.heard[OPERATOR_HEARTBEAT.name]] == [True]
-
-
-def test_scenario_sends_no_single_heartbeat_after_a_person_took_the_switch(
-    connect: Connect, spin_for: SpinFor, tmp_path: Path
+@pytest.mark.parametrize(("is_taken", "beats"), [(False, [True]), (True, [])])
+def test_scenario_sends_single_heartbeats_until_a_person_takes_the_switch(
+    connect: Connect, spin_for: SpinFor, tmp_path: Path, is_taken: bool, beats: list[bool]
 ) -> None:
-    switch = with_one_heartbeat(connect, tmp_path, 0.2)
-    switch.service.set_parameters([Parameter("pressed", value=False)])
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("operator: {heartbeats: [0.3]}\n")
+    switch = connect(wire, outputs=[OPERATOR_HEARTBEAT], scenario=str(scenario), scenario_epoch=-1.0)
+    if is_taken:
+        switch.service.set_parameters([Parameter("pressed", value=False)])
     switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
-    spin_for(0.7)
-    assert switch.heard[OPERATOR_HEARTBEAT.name] == []
+    if is_taken:
+        spin_for(0.7)
+    else:
+        switch.spin_until(lambda: switch.heard[OPERATOR_HEARTBEAT.name])
+    assert [each.data for each in switch.heard[OPERATOR_HEARTBEAT.name]] == beats
