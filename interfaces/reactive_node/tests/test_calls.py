@@ -3,7 +3,6 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-import reactivex as rx
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from reactivex.subject import Subject
@@ -47,21 +46,6 @@ def test_slow_server_gets_one_request(node: ReactiveNode, make_node: MakeNode, s
     spin_until(lambda: responses)
 
     assert len(served) == 1
-
-
-def test_call_waits_for_server_without_blocking(
-    node: ReactiveNode, peer: Node, spin_until: SpinUntil
-) -> None:
-    ticks: list[int] = []
-    responses: list[Any] = []
-    node.create_call(SetBool, "switch")(SetBool.Request()).subscribe(responses.append)
-    rx.interval(0.01).subscribe(ticks.append, scheduler=node.scheduler)
-
-    spin_until(lambda: len(ticks) > 10)
-    assert responses == []
-    peer.create_service(SetBool, "switch", answer)
-
-    spin_until(lambda: responses)
 
 
 def test_call_finds_server_while_simulated_time_stands_still(

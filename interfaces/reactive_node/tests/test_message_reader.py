@@ -156,15 +156,6 @@ def test_info_is_collected_only_for_timestamps(
     assert [reader.collects_info for reader in readers.created] == [timestamped]
 
 
-@pytest.mark.parametrize("qos", [10, LATCHED])
-def test_message_without_info_is_an_item(readers: Readers, qos: Any) -> None:
-    received: list[Any] = []
-    readers.observable(qos, every_publisher=True).subscribe(received.append)
-    (reader,) = readers.created
-    reader.callback("a")
-    assert received == ["a"]
-
-
 def test_info_is_collected_while_there_are_two_readers(readers: Readers) -> None:
     observable = readers.observable(LATCHED, every_publisher=True)
     subscription = observable.subscribe()
