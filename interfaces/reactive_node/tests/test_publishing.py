@@ -45,17 +45,6 @@ def test_error_while_a_message_is_made_is_raised_once_by_spin(
     spin_for(0.05)
 
 
-def test_publisher_lives_from_wiring_until_disposal(
-    node: ReactiveNode, peer: Node, spin_until: SpinUntil
-) -> None:
-    sink = node.publish_observable(rx.never(), Float64, "numbers")
-    spin_until(lambda: peer.count_publishers("numbers") == 1)
-
-    sink.dispose()
-    sink.dispose()
-    spin_until(lambda: peer.count_publishers("numbers") == 0)
-
-
 def test_observable_on_demand_is_observed_while_there_are_subscribers(
     node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:

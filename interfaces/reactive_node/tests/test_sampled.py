@@ -121,29 +121,18 @@ def test_period_ticks_at_once_and_by_the_scheduler_of_the_node(
     assert reads == pytest.approx([0.0, 0.2, 0.4])
 
 
-def test_observers_share_a_reader_that_ends_with_the_last(
-    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
+def test_last_observer_ends_the_ticks_and_the_reader(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None]
 ) -> None:
     topic = node.create_sampled_observable(Float64, "topic", ticks)
-    assert node.count_subscribers("topic") <= 1, "none but the talker's own"
-    received: tuple[list[Any], list[Any]] = ([], [])
-    first, second = (topic.subscribe(each.append) for each in received)
-    talker.await_readers(2)
-    talker.say(1.0)
-    spin_until(lambda: ticks.on_next(NOW) or all(received))
-    assert [len(each) for each in received] == [1, 1]
-    first.dispose()
-    talker.say(2.0)
-    spin_until(lambda: ticks.on_next(NOW) or received[1][1:])
-    assert [len(each) for each in received] == [1, 2]
-    second.dispose()
-    assert not ticks.observers
-    talker.await_readers(1)
-
-    topic.subscribe(received[0].append)
-    talker.await_readers(2)
-    talker.say(3.0)
-    spin_until(lambda: ticks.on_next(NOW) or received[0][1:])
+    for _ in range(2):
+        assert not ticks.observers
+        talker.await_readers(1)  # its own
+        observers = [topic.subscribe() for _ in range(2)]
+        talker.await_readers(2)
+        for observer in observers:
+            assert ticks.observers
+            observer.dispose()
 
 
 @pytest.mark.parametrize("end", ["on_completed", "on_error"])
