@@ -248,16 +248,6 @@ class _Clock(VirtualTime):
 # Subscribing and ending
 
 
-def test_nothing_is_subscribed_before_a_question(scheduler: VirtualTime) -> None:
-    samples = arriving(scheduler, [Arrival(0, 1.0, 0)])
-    answers_ = hold(samples, lateness=LATENESS).sample(0.1)
-    assert samples.subscriptions == []
-
-    scheduler.record(answers_, until=1.0)
-
-    assert samples.subscriptions == [ReactiveTest.subscribe(0, 1.0)]
-
-
 def test_each_subscription_has_its_own_memory(scheduler: VirtualTime) -> None:
     asked = hold(arriving(scheduler, [Arrival(0, 1.0, 0)]), lateness=LATENESS).sample(0.1)
     assert scheduler.record(asked, until=1.0).items
@@ -384,12 +374,14 @@ def test_an_observer_may_send_samples(scheduler: VirtualTime) -> None:
     assert found == [100 * MS * k for k in range(20)]
 
 
-def test_disposal_ends_everything(scheduler: VirtualTime) -> None:
+def test_samples_are_subscribed_from_the_question_to_its_disposal(scheduler: VirtualTime) -> None:
     samples = arriving(scheduler, [Arrival(k * 100 * MS, 1.0, 0) for k in range(20)])
+    asked = hold(samples, lateness=LATENESS).sample(0.1)
+    assert samples.subscriptions == []
 
-    found = items(scheduler, hold(samples, lateness=LATENESS).sample(0.1).take(3))
+    assert len(items(scheduler, asked.take(3))) == 3
 
-    assert len(found) == 3
+    assert samples.subscriptions[0].subscribe == 0
     assert samples.subscriptions[0].unsubscribe < 0.5
 
 

@@ -29,7 +29,6 @@ class Grid:
             self._answer(Answer(time, value, mark))
 
     def next(self) -> int:
-        """Return the earliest time without an answer [ns]."""
         return self._next
 
     def is_done(self, are_complete: bool) -> bool:
@@ -37,7 +36,6 @@ class Grid:
         return are_complete
 
     def restart(self, now: int) -> None:
-        """Ask from now on [ns]."""
         self._next = -(-now // self._period) * self._period
 
 
@@ -72,7 +70,6 @@ class Events(Source):
             self._answer(event, Answer(time, value, mark))
 
     def next(self) -> int | None:
-        """Return the earliest time without an answer [ns]; ``None`` if nothing is asked."""
         if self._asked:
             return self._asked[0][0]
         return self.waiting[0][0] if self.waiting else None
@@ -82,7 +79,6 @@ class Events(Source):
         return self.is_complete and not self._asked
 
     def restart(self, now: int) -> None:
-        """Ask from another time on [ns]: the clock was set."""
         super().restart(now)
         self._asked.clear()
 
