@@ -301,12 +301,6 @@ def test_many_remarks_are_reported_as_four_reasons_and_a_count(
 # Parameters
 
 
-def overridden(make_node: MakeNode, **values: Any) -> ServiceNode:
-    overrides = [Parameter(name, value=value) for name, value in values.items()]
-    node: ServiceNode = make_node("service", kind=ServiceNode, parameter_overrides=overrides)
-    return node
-
-
 def test_parameter_has_a_description_and_a_range(service: ServiceNode) -> None:
     assert service.declare(one("rate", 20.0, (1.0, 100.0), "how often", unit="Hz")).rate == 20.0
     assert service.declare(one("strikes", 3, (1, 9), "how many")).strikes == 3
@@ -321,7 +315,7 @@ def test_parameter_has_a_description_and_a_range(service: ServiceNode) -> None:
 
 @pytest.mark.parametrize("value", [0.5, 100.5, math.nan, math.inf, -math.inf, "fast"])
 def test_value_out_of_range_or_of_another_type_is_refused(make_node: MakeNode, value: float | str) -> None:
-    node = overridden(make_node, rate=value)
+    node = make_node("service", kind=ServiceNode, parameter_overrides=[Parameter("rate", value=value)])
     wrong = InvalidParameterTypeException if value == "fast" else InvalidParameterValueException
 
     with pytest.raises(wrong, match="rate"):
