@@ -158,43 +158,13 @@ class SleepyPage:
             self._socket.sendall(data)
 
 
-class Link:
-    """A TCP connection to the page server through a relay that can be stalled."""
-
-    def __init__(self, port: int) -> None:
-        self._flows = threading.Event()
-        self._flows.set()
-        self.end, near = socket.socketpair()
-        far = socket.create_connection(("127.0.0.1", port))
-        self._threads = [
-            threading.Thread(target=self._relay, args=ends, daemon=True)
-            for ends in ((near, far), (far, near))
-        ]
-        for thread in self._threads:
-            thread.start()
-
-    def stall(self) -> None:
-        self._flows.clear()
-
-    def heal(self) -> None:
-        self._flows.set()
-
-    def _relay(self, source: socket.socket, target: socket.socket) -> None:
-        with source, contextlib.suppress(OSError):
-            while data := source.recv(65536):
-                self._flows.wait()
-                target.sendall(data)
-            target.shutdown(socket.SHUT_RDWR)
-
-
 class Hand:
     """A page whose button a thread holds, without the safeguards of the real page."""
 
-    def __init__(self, line: str, tls: ssl.SSLContext | None = None, *, link: Link | None = None) -> None:
+    def __init__(self, line: str, tls: ssl.SSLContext | None = None) -> None:
         """:param line: the line that shows the address of the page."""
         origin, _, token = line.removeprefix("The page: ").partition("/#")
         self.shown: dict[str, Any] = {}
-        self.refused: list[Any] = []
         self.is_connected = True
         self._lock = threading.Lock()
         self._nonce = ""
@@ -203,7 +173,6 @@ class Hand:
             f"{origin.replace('http', 'ws', 1)}/socket",
             origin=Origin(origin),
             compression=None,
-            sock=link and link.end,
             ssl=tls,
         )
         self._connection.__enter__()
@@ -220,14 +189,6 @@ class Hand:
             self.say("press", nonce=self._nonce)
             self._holds = True
 
-    def release(self) -> float:
-        """Let go; returns when [s, monotonic clock]."""
-        with self._lock:
-            self._holds = False
-            now = time.monotonic()
-            self.say("release")
-            return now
-
     def close(self) -> None:
         self._holds = False
         self._connection.close_socket()
@@ -241,8 +202,6 @@ class Hand:
                 if message["type"] == "update":
                     self._nonce = message["nonce"]
                     self.shown |= message
-                elif message["type"] == "refused":
-                    self.refused.append(message)
         self.is_connected = False
 
     def _beat(self) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import signal
 import socket
 from functools import reduce
 from pathlib import Path
@@ -48,9 +49,12 @@ def test_each_error_of_pages_is_told_once() -> None:
     assert reported == ["a", "b", *map(str, range(requests.MOST_FAULTS - 2))]
 
 
-def test_page_on_the_machine_may_kill_a_process(sent: list[Any], tmp_path: Path) -> None:
-    assert refusals(KILL, PROGRAMS) == []
-    assert sent == [(tmp_path, "velocity", 7, 9)]
+@pytest.mark.parametrize(("action", "number"), [("kill", signal.SIGKILL), ("stop", signal.SIGSTOP)])
+def test_page_on_the_machine_may_end_or_stop_a_process(
+    sent: list[Any], tmp_path: Path, action: str, number: int
+) -> None:
+    assert refusals(KILL._replace(message=Process("velocity", action)), PROGRAMS) == []
+    assert sent == [(tmp_path, "velocity", 7, number)]
 
 
 def test_page_elsewhere_may_not(sent: list[Any]) -> None:

@@ -11,14 +11,12 @@ from typing import Any
 
 import pytest
 
-from deploy.supervision.processes import ROOT
 from tests.ports import free_port
-from tests.system.sites import Site
+from tests.system.sites import STEADY, Site
 
 from .chromium import HandOnPage
 from .record import Record
 
-STEADY = str(ROOT / "tests" / "system" / "steady.yaml")
 LINK = "127.0.0.2"  # where a test may listen between page and server
 ATTEMPTS = 5
 GONE = 0.25 + 0.1  # s for which a beat on its way may count: the age of its nonce, and the way to the topic
