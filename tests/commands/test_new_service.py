@@ -162,16 +162,6 @@ def test_file_that_cannot_be_written_changes_nothing(checkout: Path, monkeypatch
     assert content(checkout) == before
 
 
-def test_failure_of_the_tables_takes_everything_back(checkout: Path) -> None:
-    page = checkout / "services" / "README.md"
-    page.write_text(page.read_text().replace("flowchart LR", "flowchart TD"))
-    before = content(checkout)
-    error = make(checkout, "trial_guard")
-    assert error.startswith("make new-service: deploy.commands.tables: ")
-    assert error.endswith(" services/README.md needs one part that begins with flowchart LR\n")
-    assert content(checkout) == before
-
-
 def test_error_in_the_contract_is_reported_with_its_line(checkout: Path) -> None:
     contract = checkout / "interfaces" / "topics.py"
     before, _, after = contract.read_text().partition("DRIVE_TIMEOUT = 0.4")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
 import logging
 import os
@@ -23,7 +22,6 @@ from websockets.exceptions import ConnectionClosed
 from deploy.operator import hold
 from deploy.operator.page import connection, server
 from tests.operator.page.clients import TOKEN, Arm
-from tests.operator.page.noise import noise
 
 SEED = os.environ.get("FUZZ_SEED") or str(time.time_ns())
 HARMLESS = {server.Violation, server.Opened, server.Closed, hold.Release}
@@ -124,24 +122,6 @@ def test_random_frames_do_nothing(arm: Arm) -> None:
     assert server.Opened in kinds
     assert kinds <= HARMLESS, f"FUZZ_SEED={SEED}"
     assert_calm(arm, blocks)
-
-
-def test_random_messages_of_a_page_move_nothing(arm: Arm) -> None:
-    texts = [
-        '{"type": "press", "nonce": "0123456789abcdef"}',
-        '{"type": "beat", "nonce": "00"}',
-        '{"type": "release"}',
-    ]
-    messages = noise(texts, 4000, SEED)
-    for _ in range(200):
-        with contextlib.suppress(ConnectionClosed), arm.page() as page:
-            for text in itertools.islice(messages, 20):
-                page.send(text)
-    for event in received(arm):
-        if isinstance(event, hold.Press | hold.Beat):
-            assert event.sent == float("-inf"), f"FUZZ_SEED={SEED}: a guess is a nonce"
-        else:
-            assert type(event) in HARMLESS, f"FUZZ_SEED={SEED}"
 
 
 def assert_calm(arm: Arm, blocks: int) -> None:

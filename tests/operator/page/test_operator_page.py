@@ -16,7 +16,6 @@ import pytest
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 from reactivex import Observable
-from reactivex.subject import Subject
 from std_msgs.msg import Bool, Header, String
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
@@ -240,22 +239,6 @@ def test_closed_page_is_no_hand(world: World) -> None:
     world.assert_silence()
 
 
-def test_silent_page_is_released_until_the_next_press(world: World) -> None:
-    with world.page() as page:
-        page.press()
-        world.until(lambda: len(world.heartbeats) > 5)
-        page.is_held = False
-        world.for_seconds(0.4)
-        count = len(world.heartbeats)
-        page.is_held = True
-        world.for_seconds(0.5)
-        assert len(world.heartbeats) == count
-        assert page.shown["switch"]["held"] is False
-
-        page.press()
-        world.until(lambda: len(world.heartbeats) > count + 5)
-
-
 def test_beats_that_were_queued_are_no_sign_of_life(world: World) -> None:
     with world.page() as page:
         page.press()
@@ -295,30 +278,6 @@ def test_press_on_a_page_takes_the_switch_from_the_parameter(world: World) -> No
         page.release()
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
         world.assert_silence()
-
-
-def test_pressed_parameter_takes_the_switch_from_a_page(world: World) -> None:
-    with world.page() as page:
-        page.press()
-        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
-        world.until(lambda: world.switch.get_parameter("hand").value)  # the page has taken it
-        world.set_pressed(True)
-        world.until(lambda: page.shown["switch"] == {"held": True, "by": "dead_mans_switch"})
-        page.is_held = False
-        world.for_seconds(0.5)
-        assert page.shown["switch"] == {"held": True, "by": "dead_mans_switch"}
-        world.set_pressed(False)
-        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
-
-
-def test_released_parameter_releases_a_page(world: World) -> None:
-    with world.page() as page:
-        page.press()
-        world.until(lambda: len(world.heartbeats) > 5)
-        world.until(lambda: world.switch.get_parameter("hand").value)  # the page has taken it
-        world.set_pressed(False)
-        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
-        world.assert_silence(0.4)  # in which the page goes on to beat
 
 
 @pytest.fixture
@@ -519,34 +478,6 @@ def test_page_that_opens_later_is_told_why_the_engines_are_off(
     with world.page() as page:
         why = "not turned on since engine_controller started"
         world.until(lambda: page.shown["engines"]["why"] == why)
-
-
-def present_operator(make_node: Callable[..., Any]) -> None:
-    node = make_node("operator")
-    publisher = node.create_publisher(Header, "operator_presence", topics.OPERATOR_PRESENCE.qos)
-    node.create_timer(0.1, lambda: publisher.publish(Header(stamp=stamps.to_message(stamps.now()))))
-
-
-def test_page_names_the_node_that_commands_the_engines(world: World, make_node: Callable[..., Any]) -> None:
-    commands: Subject[str] = Subject()
-    world.service(make_node, "torque_guard", lambda node: node.publish(topics.ENGINES, commands))
-    world.service(make_node, "engine_controller", engine_controller.wire)
-    tool = make_node("rqt").create_publisher(String, "engines", topics.ENGINES.qos)
-    with world.page() as page:
-        refused = "no operator seen yet"
-        world.until(lambda: page.shown["engines"]["state"] == topics.OFF)
-        commands.on_next(topics.TURN_ON)
-        world.until(lambda: page.shown["engines"]["refused"] == refused)
-        present_operator(make_node)
-        world.for_seconds(0.5)
-        commands.on_next(topics.TURN_ON)
-        world.until(lambda: page.shown["engines"]["why"] == "turned on by torque_guard")
-        commands.on_next(topics.TURN_OFF)
-        world.until(lambda: page.shown["engines"]["why"] == "turned off by torque_guard")
-        commands.on_next(topics.TURN_ON)
-        world.until(lambda: page.shown["engines"]["state"] == topics.ON)
-        tool.publish(String(data=topics.TURN_OFF))
-        world.until(lambda: page.shown["engines"]["why"] == "turned off by a node that gave no name")
 
 
 def test_page_ends_and_all_others_hear_of_the_end_of_the_context(

@@ -3,8 +3,10 @@ from __future__ import annotations
 import json
 import math
 import os
+import random
 import sys
 import time
+from collections.abc import Iterator, Sequence
 
 import pytest
 
@@ -24,7 +26,6 @@ from deploy.operator.page.protocol import (
     Set,
     parse,
 )
-from tests.operator.page.noise import noise
 
 GOOD: list[tuple[str, Message]] = [
     ('{"type": "hello", "token": "s3cr3t"}', Hello("s3cr3t")),
@@ -84,26 +85,13 @@ BAD = [
 
 @pytest.mark.parametrize(("text", "message"), GOOD)
 def test_messages_of_the_protocol_are_accepted(text: str, message: Message) -> None:
-    assert parse(text) == message
-    assert type(parse(text)) is type(message)
+    assert repr(parse(text)) == repr(message), "with a number of the same type"
 
 
-@pytest.mark.parametrize("text", BAD)
-def test_other_messages_are_refused(text: str) -> None:
+@pytest.mark.parametrize("text", [*BAD, b'{"type": "release"}'])
+def test_other_messages_are_refused(text: str | bytes) -> None:
     with pytest.raises(ProtocolError):
         parse(text)
-
-
-def test_binary_messages_are_refused() -> None:
-    with pytest.raises(ProtocolError):
-        parse(b'{"type": "release"}')
-
-
-def test_value_of_a_source_is_a_number_with_a_decimal_point() -> None:
-    message = parse('{"type": "set", "name": "l1", "value": 2}')
-
-    assert isinstance(message, Set)
-    assert isinstance(message.value, float)
 
 
 def _is_within_the_protocol(message: Message) -> bool:
@@ -119,6 +107,29 @@ def _is_within_the_protocol(message: Message) -> bool:
         case Process(name, action):
             return name in PROGRAMS and action in ("kill", "stop")
     return message in (Release(), FollowScenario())
+
+
+def noise(texts: Sequence[str], count: int, seed: str) -> Iterator[str]:
+    """Yield random messages, most of them almost those of a page."""
+    chance = random.Random(seed)
+    parts = [
+        *(repr(word) for text in texts if text.startswith("{") for word in text.split('"')[1::2] if word),
+        *("0", "-1", "1e308", "-0.0", "1e-999", "true", "null", "[]", "{}", "NaN", "9" * 400),
+        *('"\\u0000"', '"ä"'),
+    ]
+    parts = [part.replace("'", '"') for part in parts]
+    for number in range(count):
+        match number % 4:
+            case 0:
+                yield chance.randbytes(chance.randrange(1, 60)).decode("latin-1")
+            case 1 | 2:
+                text = chance.choice(texts)
+                at = chance.randrange(len(text) + 1)
+                new = chr(chance.randrange(0x250)) * chance.randrange(3)
+                yield text[:at] + new + text[at + chance.randrange(4) :]
+            case 3:
+                keys = chance.choices(parts, k=chance.randrange(1, 4))
+                yield "{" + ",".join(f"{key}:{chance.choice(parts)}" for key in keys) + "}"
 
 
 def test_random_messages_do_nothing_else() -> None:

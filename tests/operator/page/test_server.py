@@ -23,7 +23,7 @@ from websockets.typing import Origin
 from deploy.operator import hold
 from deploy.operator.holder import Holder
 from deploy.operator.page import address, connection, protocol, server, state
-from deploy.operator.page.state import PageState, refuse
+from deploy.operator.page.state import PageState
 from interfaces.reactive_node.tests.leftovers import assert_nothing_is_left
 from tests.operator.page.clients import TOKEN, Arm, SleepyPage, close_code, end, message, update
 
@@ -106,10 +106,6 @@ def test_second_host_header_is_refused(arm: Arm) -> None:
     answer = arm.request(f"GET / HTTP/1.1\r\nHost: {arm.host}\r\nHost: {arm.host}\r\n\r\n".encode())
 
     assert b" 403 " in answer
-
-
-def test_localhost_is_a_name_of_the_host(arm: Arm) -> None:
-    assert arm.get("/", Host=f"localhost:{arm.port}")[0] == 200
 
 
 @pytest.mark.parametrize("host", ["localhost:9000", "127.0.0.1:9000", "localhost"])
@@ -268,20 +264,6 @@ def test_flood_of_pings_is_closed(arm: Arm) -> None:
 # Updates
 
 
-def test_update_tells_all_first_and_then_the_changes(arm: Arm) -> None:
-    arm.state = PageState(arm=state.Arm(speed=1.0, sped=math.inf))
-    with arm.page() as page:
-        first, second = update(page), update(page)
-        arm.state = PageState(arm=state.Arm(speed=2.0, sped=math.inf))
-        third = next(found for found in iter(lambda: update(page), None) if len(found) > 3)
-
-    assert first["speed"] == 1.0
-    assert first["time"] == 1.25
-    assert second.keys() == {"type", "nonce", "time"}
-    assert second["nonce"] != first["nonce"]
-    assert third.keys() == {"type", "nonce", "time", "speed"}
-
-
 def test_page_that_opens_later_gets_the_history(arm: Arm) -> None:
     arm.state = PageState(
         hands=state.Hands(holder=Holder(1e9, {"terminal_7": 1e9}))
@@ -310,18 +292,6 @@ def test_history_goes_on_after_the_last_page_has_closed_until_its_span_ends(
     rest = itertools.islice(iter(lambda: noted.get(timeout=1.5), None), 200)
     with pytest.raises(queue.Empty):
         list(rest)
-
-
-def test_refusal_reaches_its_page_only(arm: Arm) -> None:
-    with arm.page() as one, arm.page() as two:
-        first, _ = arm.next(server.Opened).page, arm.next(server.Opened).page
-        update(one), update(two)
-        arm.state = refuse(first, "press", "no")(arm.state)
-        refusal = next(found for found in iter(lambda: message(one), None) if found["type"] != "update")
-        others = [message(two)["type"] for _ in range(5)]
-
-    assert refusal == {"type": "refused", "request": "press", "why": "no"}
-    assert others == ["update"] * 5
 
 
 def test_page_that_sleeps_finds_the_newest_state_and_no_queue(arm: Arm) -> None:
@@ -375,13 +345,6 @@ def test_page_that_does_not_answer_makes_room(arm: Arm) -> None:
                     break
             assert time.monotonic() < deadline, "its place stays taken"
         assert arm.next(server.Closed).page == silent
-
-
-def test_pages_that_have_left_make_room(arm: Arm) -> None:
-    for _ in range(2 * server.MAX_PAGES):
-        with arm.page() as page:
-            update(page)
-        assert arm.next(server.Closed)
 
 
 @pytest.mark.parametrize(

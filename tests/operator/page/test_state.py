@@ -683,20 +683,3 @@ def test_lines_are_numbered_in_milliseconds_of_the_scenario_and_bounded(play: Pl
     assert len(found.lines.items) == state.MAX_LINES
     assert found.lines.items[-1] == {"time": 209500, "kind": "speed", "text": "line 499"}
     assert found.lines.total == 500
-
-
-def test_all_values_of_an_update_are_json(play: Play) -> None:
-    update = Updates("page", play.clock).update(play.run(210), "n", 210.0)
-
-    def check(value: object) -> None:
-        if isinstance(value, dict):
-            assert all(isinstance(key, str) for key in value)
-            for each in value.values():
-                check(each)
-        elif isinstance(value, list | tuple):
-            for each in value:
-                check(each)
-        else:
-            assert value is None or isinstance(value, str | bool | int) or math.isfinite(value)
-
-    check(update)

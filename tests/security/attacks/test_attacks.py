@@ -435,19 +435,6 @@ def wire() -> Iterator[Wire]:
         yield wire
 
 
-def test_packets_of_the_wire_arrive_again(wire: Wire) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(5.0)
-        _, port = receiver.getsockname()
-        with wire.recording(range(port, port + 1)):
-            receiver.sendto(b"RTPS?", ("127.0.0.1", port))
-            assert receiver.recv(10) == b"RTPS?"
-            until(lambda: wire.packets)
-        wire.repeat()
-        assert receiver.recv(10) == b"RTPS?"
-
-
 Heard = dict[str, list[object]]
 """What a watcher heard, by topic."""
 

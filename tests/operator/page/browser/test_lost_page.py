@@ -94,19 +94,6 @@ def test_stopped_program_releases_and_resumes_released(arm: Arm, hand: HandOnPag
     hand.hold()
 
 
-def test_link_that_stands_still_releases(arm: Arm, browser: Any, link: Link) -> None:
-    with closing(browser.new_context()) as context:
-        hand = HandOnPage(context, arm.url.replace("127.0.0.1", LINK))
-        hold_with_engines_on(arm, hand)
-        cut = link.cut()
-        arm.record.silence_after(cut + GONE, HELD_UP)
-        assert hand.state == "offline"
-        link.mend()
-        hand.await_live()
-        arm.record.silence_after(cut + GONE, HELD_UP + 1.0)
-        assert hand.state == "released"
-
-
 def test_queued_beats_count_for_nothing(arm: Arm, browser: Any, link: Link) -> None:
     with closing(browser.new_context()) as context:
         hand = HandOnPage(context, arm.url.replace("127.0.0.1", LINK), chromium.STUBBORN)
