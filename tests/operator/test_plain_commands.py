@@ -12,10 +12,7 @@ from threading import Event, Thread
 from typing import Any
 
 import pytest
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
@@ -24,7 +21,7 @@ from deploy.supervision.processes import ROOT
 from deploy.supervision.recorder import Recorder
 from deploy.supervision.supervisord import Program
 from interfaces import topics
-from interfaces.service import middleware
+from reactive_node.testing import MakeNode
 from tests.operator.test_plain_text import CONTROLS, EVIL, LIES, is_safe
 from tests.promises.history import InjectedFault, Life
 from tests.promises.observations import FAULTS, PROCESSES
@@ -60,13 +57,10 @@ class Arm:
 
 
 @pytest.fixture
-def stranger(domain_id: int) -> Iterator[None]:
+def stranger(make_node: MakeNode) -> Iterator[None]:
     """Reports the health of a service in words of his own, again and again."""
-    context = Context()
-    with middleware.without_shared_memory():
-        rclpy.init(args=[], context=context)
-        node = Node("stranger", context=context)
-    publisher = node.create_publisher(topics.DIAGNOSTICS.type, "/diagnostics", topics.DIAGNOSTICS.qos)
+    topic = topics.DIAGNOSTICS
+    publisher = make_node("stranger").create_publisher(topic.type, topic.name, topic.qos)
     values = [
         KeyValue(key="pid", value=str(PID)),
         KeyValue(key="published", value="1"),
@@ -91,9 +85,6 @@ def stranger(domain_id: int) -> Iterator[None]:
     yield
     ended.set()
     thread.join()
-    node.destroy_node()
-    context.shutdown()
-    context.destroy()
 
 
 @pytest.mark.parametrize(

@@ -25,25 +25,20 @@ GONE = 0.25 + 0.1  # s for which a beat on its way may count: the age of its non
 class Arm:
     """A running system in which nothing moves and nobody holds the switch."""
 
-    def __init__(
-        self, run: Path, domain: int, namespace: str = "", scenario: str = STEADY, **page: object
-    ) -> None:
-        """:param namespace: the network namespace of the system; empty for that of this process."""
+    def __init__(self, run: Path, domain: int, scenario: str = STEADY, **page: object) -> None:
         self.site = Site(run, domain)
         self.port = free_port()
         page = {"port": self.port} | page
         parameters = run.with_suffix(".yaml")
         lines = "".join(f"\n    {name}: {value}" for name, value in page.items())
         parameters.write_text(f"operator_page:\n  ros__parameters:{lines}\n")
-        within = ["ip", "netns", "exec", namespace] if namespace else []
-        launcher = [self.site.python, "-m", "deploy.commands.launcher"]
-        code, printed = self.site.do_command(*within, *launcher, "start", scenario, str(parameters))
+        code, printed = self.site.do("start", scenario, str(parameters))
         assert code == 0, printed
         found = re.fullmatch(r"The page: (\S+)\n", (run / "settings" / "page.txt").read_text())
         assert found
         self.url = found[1]
         """The address of the page."""
-        self.record = Record(domain, namespace)
+        self.record = Record(domain)
 
     def close(self) -> None:
         self.record.close()

@@ -96,9 +96,9 @@ def playwright() -> Iterator[Any]:
         yield started
 
 
-def launch(started: Any, *, executable: str = CHROMIUM) -> Any:
+def launch(started: Any) -> Any:
     return started.chromium.launch(
-        executable_path=executable,
+        executable_path=CHROMIUM,
         args=FLAGS,
         headless=False,  # --headless=new is among the flags
         handle_sigint=False,

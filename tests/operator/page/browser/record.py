@@ -1,13 +1,7 @@
-"""A node outside of the arm that records, with their source times, the messages that the switch moves.
-
-It is a process of its own, because it may have to be in the network namespace of the arm.
-"""
+"""A node outside of the arm that records, with their source times, the messages that the switch moves."""
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -17,12 +11,10 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from deploy.supervision.processes import ROOT
 from interfaces import topics
 from tests.system.sites import LIMIT, Peer
 
 DEPTH = 500  # messages that may wait while this process is not scheduled
-RECORDED = (topics.OPERATOR_HEARTBEAT, topics.ENGINES_STATE)
 
 
 class State(NamedTuple):
@@ -33,31 +25,28 @@ class State(NamedTuple):
 class Record:
     """The heartbeats and the engines' states since the beginning; a thread takes them."""
 
-    def __init__(self, domain: int, namespace: str = "") -> None:
-        """:param namespace: the network namespace of the arm; empty for that of this process."""
+    def __init__(self, domain: int) -> None:
         self.beats: list[float] = []
         """Source times [s since 1970]."""
         self.states: list[State] = []
-        within = ["ip", "netns", "exec", namespace] if namespace else []
-        self._process = subprocess.Popen(
-            [*within, sys.executable, "-m", __name__, str(domain)],
-            cwd=ROOT,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            bufsize=1,
-        )
-        self._thread = threading.Thread(target=self._read)
+        self._peer = Peer(domain)
+        self._commands = self._peer.publisher(topics.ENGINES)
+        self._read(topics.OPERATOR_HEARTBEAT, lambda at, _: self.beats.append(at))
+        self._read(topics.ENGINES_STATE, lambda at, message: self.states.append(State(at, message.data)))
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._spin)
         self._thread.start()
 
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            topic, at, value = json.loads(line)
-            if topic == topics.ENGINES_STATE.name:
-                self.states.append(State(at, value))
-            else:
-                self.beats.append(at)
+    def _read(self, topic: topics.Topic, receive: Callable[[float, Any], None]) -> None:
+        def read(message: Any, info: Any) -> None:
+            receive(info["source_timestamp"] / 1e9, message)
+
+        deep = QoSProfile(depth=DEPTH, reliability=topic.qos.reliability, lifespan=Duration())
+        self._peer.node.create_subscription(topic.type, topic.name, read, deep)
+
+    def _spin(self) -> None:
+        while not self._end.is_set():
+            self._peer.spin_once(0.1)
 
     def until(self, condition: Callable[[], object], seconds: float = LIMIT, period: float = 0.005) -> None:
         """Wait until a condition is true; look once in a period [s]."""
@@ -92,8 +81,7 @@ class Record:
                 if not is_held():
                     return
                 due = time.monotonic() + 0.5
-                assert self._process.stdin is not None
-                self._process.stdin.write(f"{topics.TURN_ON}\n")
+                self._commands.publish(String(data=topics.TURN_ON))
             time.sleep(0.01)
 
     def await_off(self, moment: float) -> float:
@@ -111,36 +99,6 @@ class Record:
         return min(stopped, last_on + topics.DRIVE_TIMEOUT)
 
     def close(self) -> None:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.close()
-        self._process.wait(LIMIT)
+        self._end.set()
         self._thread.join()
-        self._process.stdout.close()
-
-
-def main(domain: int) -> None:
-    """Print topic, source time and value of each message; publish each line of the input as a command."""
-    peer = Peer(domain)
-    commands = peer.publisher(topics.ENGINES)
-    for topic in RECORDED:
-        deep = QoSProfile(depth=DEPTH, reliability=topic.qos.reliability, lifespan=Duration())
-        peer.node.create_subscription(topic.type, topic.name, _printer(topic), deep)
-    reader = threading.Thread(
-        target=lambda: [commands.publish(String(data=line.strip())) for line in sys.stdin]
-    )
-    reader.start()
-    while reader.is_alive():
-        peer.spin_once(0.1)
-    peer.close()
-
-
-def _printer(topic: topics.Topic) -> Callable[[Any, Any], None]:
-    def receive(message: Any, info: Any) -> None:
-        print(json.dumps([topic.name, info["source_timestamp"] / 1e9, message.data]), flush=True)
-
-    return receive
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]))
+        self._peer.close()

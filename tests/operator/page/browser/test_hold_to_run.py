@@ -1,7 +1,7 @@
 """A hand holds the page of a running arm, with the engines on, and lets go in every way that a page knows.
 
 The times are the source times of heartbeats. Heartbeats must stop. That the engines are off within 10.5 s of
-the last heartbeat (S1) follows from that: test_lost_page.py and test_cut_link.py measure it.
+the last heartbeat (S1) follows from that: test_lost_page.py measures it.
 
 By its rules the page also releases when the machine stands still for 250 ms. A test that this disturbs begins
 again.

@@ -51,6 +51,17 @@ async () => {
 }
 """
 
+LOCAL = """
+async () => {
+    const { Processes } = await import("/static/processes.js");
+    const table = new Processes(() => true);
+    return [true, false].map((local) => {
+        table.render({ processes: [], welcome: { programs: ["velocity"], local }, time: 0 }, true);
+        return document.querySelector("#processes [data-action=kill]").checkVisibility();
+    });
+}
+"""
+
 OVERLAPS = """
 async () => {
     const { labelPlaces } = await import("/static/arm.js");
@@ -352,6 +363,10 @@ def test_host_stands_with_the_name_of_a_process(page: Any) -> None:
     name = "velocity"
     hosts = ["robot1", "robot1, robot2"]
     assert page.evaluate(HOSTS) == [name, *(f"{name}\n{host}" for host in hosts), name]
+
+
+def test_page_of_another_host_has_no_buttons_to_kill(page: Any) -> None:
+    assert page.evaluate(LOCAL) == [True, False]
 
 
 def test_labels_of_the_angles_never_overlap(page: Any) -> None:
