@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from deploy.operator.terminal.plain import PlainLines
 
-
-class Display(Protocol):
-    takes_input: bool
-    """Whether somebody can still type."""
-
-    def show(self, lines: Iterable[str]) -> None:
-        """Print lines; never block."""
-
-    def show_state(self, parts: Sequence[tuple[str, str]]) -> None:
-        """Keep a line with these parts in view, if that is possible: how each looks, and its text."""
-
-    def read(self, seconds: float) -> list[str]:
-        """Return typed lines as soon as there are any; wait at most so long [s]. EOFError after Ctrl-D."""
-
-    def close(self) -> None:
-        """Leave the terminal as it was."""
+if TYPE_CHECKING:
+    from deploy.operator.terminal.prompt import Prompt
 
 
-def open_display(words: Sequence[str]) -> Display:
+def open_display(words: Sequence[str]) -> PlainLines | Prompt:
     """Return the display of this process; a prompt completes the words."""
     if not _takes_a_prompt():
         return PlainLines()

@@ -16,6 +16,7 @@ class PlainLines:
         """Read standard input, unless it is closed."""
         self._input = None if sys.stdin is None else sys.stdin.fileno()
         self.takes_input = self._input is not None
+        """Whether somebody can still type."""
         self._is_terminal = self._input is not None and os.isatty(self._input)  # after a hang-up, no
         self._typed = b""
 
@@ -28,6 +29,7 @@ class PlainLines:
         """Nothing: a line that changes would fill a file or a pipe."""
 
     def read(self, seconds: float) -> list[str]:
+        """Return typed lines as soon as there are any; wait at most so long [s]. EOFError after Ctrl-D."""
         if self._input is None:
             time.sleep(seconds)
             return []
