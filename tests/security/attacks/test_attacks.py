@@ -274,24 +274,13 @@ def test_permissions_of_another_enclave_do_not_join(make_peer: MakePeer, copy: K
 
 def test_an_expired_certificate_does_not_join(make_peer: MakePeer, copy: Keystore, tmp_path: Path) -> None:
     folder = copy.folder / "enclaves" / "velocity"
-    request = tmp_path / "request.pem"
-    ca, key = copy.folder / "public" / "ca.cert.pem", copy.folder / "private" / "ca.key.pem"
-    openssl = ["openssl", "x509", "-x509toreq", "-in", str(folder / "cert.pem")]
-    subprocess.run([*openssl, "-signkey", str(folder / "key.pem"), "-out", str(request)], check=True)
-    renew = [
-        "openssl",
-        "x509",
-        "-req",
-        "-in",
-        str(request),
-        "-CA",
-        str(ca),
-        "-CAkey",
-        str(key),
-        "-days",
-        "-1",
-    ]
-    subprocess.run([*renew, "-set_serial", "7", "-out", str(folder / "cert.pem")], check=True)
+    request, certificate, key = tmp_path / "request.pem", folder / "cert.pem", folder / "key.pem"
+    ca, ca_key = copy.folder / "public" / "ca.cert.pem", copy.folder / "private" / "ca.key.pem"
+    for words in (
+        f"x509 -x509toreq -in {certificate} -signkey {key} -out {request}",
+        f"x509 -req -in {request} -CA {ca} -CAkey {ca_key} -days -1 -set_serial 7 -out {certificate}",
+    ):
+        subprocess.run(["openssl", *words.split()], check=True)
     with pytest.raises(Refused, match=r"cannot join DDS domain [^\n]* expired"):
         make_peer("velocity", ROS_SECURITY_KEYSTORE=str(copy.folder))
 
