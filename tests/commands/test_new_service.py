@@ -12,6 +12,8 @@ import pytest
 from deploy.commands import new_service
 from deploy.supervision.processes import ROOT
 
+NO_NAME = "must be a name of up to 30 small letters, such as torque_guard"
+NO_NAMES = ("", "Torque", "../torque", "a__b", "a" * 31, "class")
 FILES = ("conftest.py", "pyproject.toml", "Makefile", "README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 
 
@@ -53,8 +55,19 @@ def checkout(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_new_service_is_green_at_once(checkout: Path) -> None:
+def test_new_services_are_green_at_once_and_need_three_places_besides_their_test(checkout: Path) -> None:
+    before = content(checkout)
     assert make(checkout, "trial_guard") == ""
+    after = content(checkout)
+    assert {str(path.relative_to(checkout)) for path in after if before.get(path) != after[path]} == {
+        "services/trial_guard.py",
+        "tests/component/test_trial_guard.py",
+        "interfaces/topics.py",
+        "deploy/supervisord.conf",
+        "interfaces/README.md",
+        "services/README.md",
+    }
+    assert make(checkout, "trial_alarm") == ""
 
     tests = [f"tests/component/test_{name}.py" for name in ("trial_guard", "contract", "readme", "topics")]
     tests += ["tests/supervision/test_manifest.py", "tests/chaos/test_schedule.py"]
@@ -84,36 +97,13 @@ def test_a_name_may_contain_a_word_of_the_template(checkout: Path, name: str) ->
     assert f'"{name}/input"' in (checkout / "interfaces" / "topics.py").read_text()
 
 
-def test_two_services_may_be_added(checkout: Path) -> None:
-    assert [make(checkout, name) for name in ("trial_guard", "trial_alarm")] == ["", ""]
-    found = run(checkout, "pytest", "-q", "-p", "no:cacheprovider", "tests/component/test_contract.py")
-    assert found.returncode == 0, found.stdout
-
-
-def test_new_service_needs_three_places_besides_its_test(checkout: Path) -> None:
-    before = content(checkout)
-    make(checkout, "trial_guard")
-    after = content(checkout)
-    changed = {str(path.relative_to(checkout)) for path in after if before.get(path) != after[path]}
-    assert changed == {
-        "services/trial_guard.py",
-        "tests/component/test_trial_guard.py",
-        "interfaces/topics.py",
-        "deploy/supervisord.conf",
-        "interfaces/README.md",
-        "services/README.md",
-    }
-
-
 @pytest.mark.parametrize(
     ("name", "error"),
     [
-        ("", "NAME=: must be a name of up to 30 small letters, such as torque_guard"),
-        ("Torque", "NAME=Torque: must be a name of up to 30 small letters, such as torque_guard"),
-        ("../torque", "NAME=../torque: must be a name of up to 30 small letters, such as torque_guard"),
-        ("a__b", "NAME=a__b: must be a name of up to 30 small letters, such as torque_guard"),
-        ("a" * 31, f"NAME={'a' * 31}: must be a name of up to 30 small letters, such as torque_guard"),
-        ("class", "NAME=class: must be a name of up to 30 small letters, such as torque_guard"),
+        *(
+            (name, f"NAME={name}: {NO_NAME}")
+            for name in ("", "Torque", "../torque", "a__b", "a" * 31, "class")
+        ),
         ("kinematics", "NAME=kinematics: is taken by services/kinematics.py"),
         ("examples", "NAME=examples: is taken by services/examples"),
         ("listing_5_9", "NAME=listing_5_9: is taken by tests/component/test_listing_5_9.py"),
