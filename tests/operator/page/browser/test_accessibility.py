@@ -1,4 +1,4 @@
-"""axe finds nothing to complain about, on the page and on the report."""
+"""axe finds nothing to complain about on the page and the report, and the report is read in every width."""
 
 from __future__ import annotations
 
@@ -30,6 +30,23 @@ async () => (await axe.run(document, { resultTypes: ["violations"] })).violation
 )
 """
 
+LEGIBLE = 12  # px
+TOO_WIDE = """
+() => [...document.querySelectorAll(".card:has(table)")]
+    .filter((it) => it.scrollWidth > it.clientWidth).map((it) => it.textContent)
+"""
+SMALL = """
+(least) => [...document.querySelectorAll("h1, h2, p, td, .evidence, text")]
+    .filter((it) => parseFloat(getComputedStyle(it).fontSize) < least).map((it) => it.textContent)
+"""
+SCROLL = """
+() => [...document.querySelectorAll(".chart")].map((card) => {
+    card.scrollLeft = card.scrollWidth;
+    const names = card.querySelector(".names").getBoundingClientRect();
+    return [card.scrollLeft, names.left - card.getBoundingClientRect().left, names.height];
+})
+"""
+
 
 def found(page: Any) -> list[str]:
     """Return what axe finds."""
@@ -56,11 +73,32 @@ def test_axe_finds_nothing_on_the_page(arm: Arm, browser: Any, size: str, scheme
         assert [each for each in found(hand.page) if "contrast" not in each] == []  # grey on purpose
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_on_the_report(browser: Any, scheme: str) -> None:
+@pytest.fixture
+def report() -> str:
     history = killed(good(), "kinematics", 20.0, 9.0)
-    findings = [*checked(history)]
+    return html("chaos", ["Seed 7."], [*checked(history)], history)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_on_the_report(browser: Any, report: str, scheme: str) -> None:
     with closing(browser.new_context(color_scheme=scheme)) as context:
         page = context.new_page()
-        page.set_content(html("chaos", ["Seed 7."], findings, history))
+        page.set_content(report)
         assert found(page) == []
+
+
+@pytest.mark.parametrize("width", [320, 390, 844, 1280])
+def test_report_is_read_without_moving_its_tables(browser: Any, report: str, width: int) -> None:
+    with closing(browser.new_context(viewport={"width": width, "height": 844})) as context:
+        page = context.new_page()
+        page.set_content(report)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate(TOO_WIDE) == []
+        assert page.evaluate(SMALL, LEGIBLE) == []
+        for chart in page.locator(".chart").all():
+            page.keyboard.press("Tab")
+            assert chart.evaluate("it => it === document.activeElement")
+        for scrolled, left, height in page.evaluate(SCROLL):
+            assert (width > 1000) or scrolled > 0
+            assert 0 <= left <= 20, "the names of the rows stay"
+            assert height > 200

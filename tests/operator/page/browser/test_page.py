@@ -122,16 +122,6 @@ BREAK = """
 """
 """Notes whether the drawing of the chain breaks, however shortly."""
 
-INLINE = """
-window.violations = [];
-document.addEventListener("securitypolicyviolation", (event) => violations.push(event.effectiveDirective));
-const script = document.createElement("script");
-script.textContent = "window.ran = true;";
-document.head.append(script);
-document.body.insertAdjacentHTML("beforeend", "<img src='http://127.0.0.1:9/' onerror='window.ran = true'>");
-fetch("http://127.0.0.1:9/").catch(() => {});
-"""
-
 
 @pytest.fixture(scope="module")
 def shared(arm: Arm, browser: Any) -> Any:
@@ -144,38 +134,26 @@ def shared(arm: Arm, browser: Any) -> Any:
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_page_fits_into_every_width(shared: HandOnPage, width: int) -> None:
-    shared.page.set_viewport_size({"width": width, "height": WIDTHS[width]})
+    page = shared.page
+    page.set_viewport_size({"width": width, "height": WIDTHS[width]})
     shared.await_drawing()
-    assert shared.page.evaluate("innerWidth") == width
-    assert shared.page.evaluate(
-        "document.documentElement.scrollWidth <= document.documentElement.clientWidth"
-    )
-    assert shared.page.evaluate(BEYOND) == []
-    assert shared.page.evaluate(CUT_OFF) == []
-
-
-@pytest.mark.parametrize("width", WIDTHS)
-def test_every_control_is_large_enough_for_a_finger(shared: HandOnPage, width: int) -> None:
-    shared.page.set_viewport_size({"width": width, "height": WIDTHS[width]})
-    shared.await_drawing()
-    assert shared.page.evaluate(SMALL, TARGET) == []
-
-
-@pytest.mark.parametrize("width", WIDTHS)
-def test_hand_and_engines_stay_at_their_place(shared: HandOnPage, width: int) -> None:
-    shared.page.set_viewport_size({"width": width, "height": WIDTHS[width]})
+    assert page.evaluate("innerWidth") == width
+    assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    assert page.evaluate(BEYOND) == []
+    assert page.evaluate(CUT_OFF) == []
+    assert page.evaluate(SMALL, TARGET) == []
     places = []
     for top in (0, 300, 1e6):
-        shared.page.evaluate("top => scrollTo(0, top)", top)
+        page.evaluate("top => scrollTo(0, top)", top)
         shared.await_drawing()
-        boxes = [shared.page.locator(it).bounding_box() for it in ("#hold", "#turn-on", "#turn-off")]
+        boxes = [page.locator(it).bounding_box() for it in ("#hold", "#turn-on", "#turn-off")]
         for box in boxes:
             assert 0 <= box["y"] <= WIDTHS[width] - box["height"]
             assert 0 <= box["x"] <= width - box["width"]
         places.append(boxes)
-        assert shared.page.evaluate(COVERED) == []
-    shared.page.evaluate("scrollTo(0, 0)")
-    assert width >= 700 or places[0] == places[1] == places[2]
+        assert page.evaluate(COVERED) == []
+    page.evaluate("scrollTo(0, 0)")
+    assert width >= 700 or places[0] == places[1] == places[2], "hand and engines stay at their place"
 
 
 def test_phone_on_its_side_shows_axes(shared: HandOnPage) -> None:
@@ -200,16 +178,7 @@ def test_every_control_has_a_name(shared: HandOnPage) -> None:
     assert [len(names[role]) for role in CONTROLS] == [13 + 2 * len(manifest.programs()), 4, 4]
     for role in CONTROLS:
         assert len(set(names[role])) == len(names[role]), "each name says which control it is"
-
-
-def test_page_runs_no_foreign_script(shared: HandOnPage) -> None:
     assert shared.errors == []  # of the whole page so far
-    shared.page.evaluate(INLINE)
-    shared.page.wait_for_timeout(200)
-    assert shared.page.evaluate("window.ran") is None
-    directives = set(shared.page.evaluate("violations"))
-    assert directives >= {"script-src-elem", "img-src", "connect-src"}
-    shared.errors.clear()
 
 
 def test_address_without_its_token_shows_nothing(arm: Arm, browser: Any) -> None:
