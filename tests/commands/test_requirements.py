@@ -47,12 +47,6 @@ def test_a_distributions_requirements_are_pinned_in_their_ranges(project: str) -
     assert unmet(distribution["build-system"]["requires"], pins("build")) == []
 
 
-def test_a_package_has_the_same_version_in_every_file() -> None:
-    everything = pins(*FILES)
-    for name in FILES:
-        assert pins(name).items() <= everything.items()
-
-
 @pytest.mark.parametrize("name", [*FILES, "kilted"])
 def test_each_package_has_a_hash_of_each_of_its_files(name: str) -> None:
     for line in lines(name):

@@ -20,11 +20,6 @@ LINES = 5000  # of 100 characters, more than a pipe holds
 FLOOD = f"from deploy.operator.output import say\nfor _ in range({LINES}): say('#' * 99)"
 
 
-def test_line_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
-    say("All have ended.")
-    assert capfd.readouterr().out == "All have ended.\n"
-
-
 def test_reader_that_does_not_read_blocks_nothing() -> None:
     with subprocess.Popen([sys.executable, "-c", FLOOD], cwd=ROOT, stdout=subprocess.PIPE) as process:
         try:

@@ -89,9 +89,3 @@ def test_strikes_are_those_of_the_arm(arm: Arm) -> None:
 def test_service_that_complains_is_named(arm: Arm) -> None:
     arm.report("kinematics", level=DiagnosticStatus.WARN)
     assert "1 of 2 ok (kinematics)" in arm.line()
-
-
-def test_hand_without_a_name_holds() -> None:
-    arm = Arm()
-    arm.say(topics.OPERATOR_HEARTBEAT, True)
-    assert arm.line() == "Engines: unknown · Held"

@@ -249,17 +249,6 @@ def test_another_hand_takes_the_switch_from_the_terminal(
 
 
 @pytest.mark.timed
-def test_other_parameter_of_the_switch_that_is_set_releases_no_terminal(
-    held: Switch, live_until: Live, said: list[str]
-) -> None:
-    held.node.set_parameters([Parameter("rate", value=21.0)])
-    live_for(0.3, live_until)
-    held.heartbeats.clear()
-    live_until(lambda: len(held.heartbeats) > 5)
-    assert said == []
-
-
-@pytest.mark.timed
 def test_death_of_the_virtual_switch_releases_no_terminal(
     held: Switch, live_until: Live, make_node: MakeNode
 ) -> None:

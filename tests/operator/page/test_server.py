@@ -22,7 +22,7 @@ from websockets.typing import Origin
 
 from deploy.operator import hold
 from deploy.operator.holder import Holder
-from deploy.operator.page import address, connection, protocol, server, state
+from deploy.operator.page import address, protocol, server, state
 from deploy.operator.page.state import PageState
 from interfaces.reactive_node.tests.leftovers import assert_nothing_is_left
 from tests.operator.page.clients import TOKEN, Arm, SleepyPage, close_code, end, message, update
@@ -170,14 +170,6 @@ def test_press_before_hello_closes_the_connection(arm: Arm) -> None:
         page.send('{"type": "press", "nonce": ""}')
         assert close_code(page) == 4400
     assert arm.next() == server.Violation("a page does not begin with hello")
-
-
-def test_connection_without_hello_is_closed(arm: Arm) -> None:
-    with arm.connect() as page:
-        begin = time.monotonic()
-        assert close_code(page) == 4408
-        assert time.monotonic() - begin < connection.HELLO_TIMEOUT + 1.0
-    assert arm.next(server.Violation)
 
 
 def test_welcome_says_what_the_page_needs(arm: Arm) -> None:
