@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from enum import IntEnum, auto
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import reactivex as rx
 from reactivex import Observable
@@ -21,6 +21,11 @@ from reactive_node.stamps import Timestamp
 
 Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
 """Gives the values of a topic with their source times."""
+Complaints = dict[tuple[str, str], str]
+"""The complaint of each service, by host and name; empty if it does not complain."""
+Ways = dict[str, int]
+"""By host, whether its clock was shown to be right (0), behind (1) or ahead (-1)."""
+Known = TypeVar("Known")
 
 BURST = 6  # lines of a kind in a row before they are thinned
 DISCOVERY = 1.0  # s within which a drive is heard, if there is one
@@ -54,13 +59,6 @@ class Line(NamedTuple):
     text: str
 
 
-class Complaints(NamedTuple):
-    known: dict[tuple[str, str], str]
-    """By host and name of the service; empty if it does not complain."""
-    new: Timestamp[str]
-    """The changes in the latest message of ``/diagnostics``."""
-
-
 class Lives(NamedTuple):
     """The lives of processes, by host and program."""
 
@@ -70,17 +68,6 @@ class Lives(NamedTuple):
     """The pid of the process, and when the one before it died."""
     back: dict[tuple[str, str], tuple[int, datetime]]
     """The pid of the process, and when it first reported its health."""
-    new: list[Line]
-    """The changes in the latest message of ``/diagnostics``."""
-
-
-class Differences(NamedTuple):
-    """The clocks of other hosts."""
-
-    shown: dict[str, int]
-    """By host, whether its clock was shown to be right (0), behind (1) or ahead (-1)."""
-    new: list[Line]
-    """The changes in the latest message of ``/diagnostics``."""
 
 
 def line_batches(seen: Seen, ticks: Observable[Any], namespace: str = "/") -> Observable[list[Line]]:
@@ -147,23 +134,20 @@ def states(seen: Seen) -> Observable[Line]:
         begin = message.timestamp - timedelta(seconds=found.since)
         return Line(begin, Kind.STATE, f"Engines are {found.state}{why}")
 
-    lines = seen(topics.ENGINES_CAUSE).map(line).distinct_until_changed(lambda it: it.text)
-    allowance = Allowance(BURST)
-    return lines.filter(lambda it: allowance.covers(Timestamp(None, it.time)))
+    return _few(seen(topics.ENGINES_CAUSE).map(line).distinct_until_changed(lambda it: it.text))
 
 
 def services(seen: Seen, namespace: str) -> Observable[Line]:
     """The complaints of services, each when it is new."""
 
-    def compare(before: Complaints, diagnostics: Timestamp[Any]) -> Complaints:
+    def compare(known: Complaints, diagnostics: Timestamp[Any]) -> tuple[Complaints, list[Line]]:
         now = dict(_complaints(diagnostics.value, namespace.rstrip("/")))
-        new = [f"{key[1]}: {now[key]}" for key in now if now[key] and now[key] != before.known.get(key)]
-        return Complaints(newest(before.known | now), Timestamp("; ".join(new), diagnostics.timestamp))
+        new = [f"{key[1]}: {now[key]}" for key in now if now[key] and now[key] != known.get(key)]
+        lines = [Line(diagnostics.timestamp, Kind.SERVICE, "; ".join(new))] if new else []
+        return newest(known | now), lines
 
-    complaints = (
-        seen(topics.DIAGNOSTICS).scan(compare, Complaints({}, Timestamp("", FIRST))).map(lambda it: it.new)
-    )
-    return thinned(complaints.filter(lambda it: it.value)).map(_line(Kind.SERVICE, str))
+    nothing: Complaints = {}
+    return _few(_news(seen, compare, nothing))
 
 
 def unrepeated(
@@ -189,8 +173,8 @@ def deaths(seen: Seen, namespace: str) -> Observable[Line]:
     """Each death of a process, when the next one has reported its health: that is when it is back."""
     prefix = namespace.rstrip("/")
 
-    def compare(before: Lives, diagnostics: Timestamp[Any]) -> Lives:
-        shown, died, back, new = dict(before.shown), dict(before.died), dict(before.back), []
+    def compare(before: Lives, diagnostics: Timestamp[Any]) -> tuple[Lives, list[Line]]:
+        shown, died, back, new = dict(before.shown), dict(before.died), dict(before.back), list[Line]()
         for name, health in healths(diagnostics.value, prefix).items():
             if back.get((health.host, name), (0, FIRST))[0] != health.pid:
                 back[health.host, name] = health.pid, diagnostics.timestamp
@@ -207,37 +191,47 @@ def deaths(seen: Seen, namespace: str) -> Observable[Line]:
                 away = (returned - died[key][1]).total_seconds()
                 text = f"{program.name} {how} ({program.exit}), back after {away:.1f} s"
                 new.append(Line(returned, Kind.PROCESS, text))
-        return Lives(newest(shown), newest(died), newest(back), new)
+        return Lives(newest(shown), newest(died), newest(back)), new
 
-    lives = seen(topics.DIAGNOSTICS).scan(compare, Lives({}, {}, {}, []))
-    return _each_new(lives)
+    return _news(seen, compare, Lives({}, {}, {}))
 
 
 def clocks(seen: Seen, namespace: str) -> Observable[Line]:
     """By how much two clocks differ: when that is known, and when it begins or ends to matter."""
 
-    def compare(before: Differences, diagnostics: Timestamp[Any]) -> Differences:
-        shown, new = dict(before.shown), []
+    def compare(shown: Ways, diagnostics: Timestamp[Any]) -> tuple[Ways, list[Line]]:
+        known, new = dict(shown), []
         for host, (behind, other) in reported_clocks(diagnostics.value, namespace.rstrip("/")).items():
             way = (behind > topics.CLOCK_TOLERANCE) - (behind < -topics.CLOCK_TOLERANCE)
-            if shown.get(host) != way:
-                shown[host] = way
+            if known.get(host) != way:
+                known[host] = way
                 text = difference(host, behind, f"that of {other}")
                 new.append(Line(diagnostics.timestamp, Kind.SERVICE, text))
-        return Differences(newest(shown), new)
+        return newest(known), new
 
-    differences = seen(topics.DIAGNOSTICS).scan(compare, Differences({}, []))
-    return _each_new(differences)
+    nothing: Ways = {}
+    return _news(seen, compare, nothing)
 
 
-def _each_new(states: Observable[Any]) -> Observable[Line]:
-    """Emit what is new in each state. Most have nothing new: for these, there is no inner observable."""
-    return states.filter(lambda it: it.new).flat_map(lambda it: rx.from_iterable(it.new))
+def _news(
+    seen: Seen, compare: Callable[[Known, Timestamp[Any]], tuple[Known, list[Line]]], nothing: Known
+) -> Observable[Line]:
+    """Emit the lines with which each message of ``/diagnostics`` changes what is known."""
+    states = seen(topics.DIAGNOSTICS).scan(lambda before, it: compare(before[0], it), (nothing, list[Line]()))
+    # Most messages bring nothing new: for these, there is no inner observable.
+    return states.filter(lambda it: bool(it[1])).flat_map(lambda it: rx.from_iterable(it[1]))
 
 
 def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable[Timestamp[Any]]:
     """Emit at most ``burst`` items in a row, then the first of each second; pauses refill the burst."""
-    return items.filter(Allowance(burst).covers)
+    allowance = Allowance(burst)
+    return items.filter(lambda it: allowance.covers(it.timestamp))
+
+
+def _few(lines: Observable[Line]) -> Observable[Line]:
+    """Do the same with lines."""
+    allowance = Allowance(BURST)
+    return lines.filter(lambda it: allowance.covers(it.time))
 
 
 class Allowance:
@@ -251,9 +245,9 @@ class Allowance:
         self._left = burst
         self._second = 0
 
-    def covers(self, item: Timestamp[Any]) -> bool:
-        """Whether an item may be shown; it is counted then."""
-        second = int(item.timestamp.timestamp())
+    def covers(self, time: datetime) -> bool:
+        """Whether an item of a time may be shown; it is counted then."""
+        second = int(time.timestamp())
         self._left = min(self._burst, self._left + max(0, second - self._second))
         self._second = second
         if not self._left:

@@ -28,7 +28,6 @@ from interfaces import topics
 from interfaces.plain_text import plain
 from interfaces.service.reading import observe
 from reactive_node import ReactiveNode, stamps
-from reactive_node.stamps import Timestamp
 
 PERIOD = 0.25  # s between two batches of lines
 BACKLOG = 50  # messages of a topic that wait for the next batch
@@ -124,7 +123,7 @@ class Terminal:
 
     def _drop(self, topic: str, reason: str) -> None:
         """Show what is wrong with a message, at most once a second after a burst."""
-        if self._dropped.covers(Timestamp(reason, stamps.now())):
+        if self._dropped.covers(stamps.now()):
             self._report(f"Dropped from {topic}: {reason}")
 
     def _milliseconds(self, line: Line) -> float:
