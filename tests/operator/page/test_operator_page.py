@@ -30,11 +30,9 @@ from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION
 from reactive_node import ReactiveNode, stamps
+from reactive_node.testing import MakeNode, SpinUntil
 from services import config_publisher, dead_mans_switch, engine_controller
 from tests.ports import free_port
-
-SpinUntil = Callable[..., None]
-
 
 STEP = 1.1 * UPDATE_PERIOD  # s: each step brings an update
 PATIENCE = 1.0  # s: the server sends no update to a page that has not answered its ping
@@ -115,23 +113,23 @@ class Page:
 class World:
     """The page program with a dead man's switch, two sources, and an observer of the topics."""
 
-    def __init__(
-        self, make_node: Callable[..., Any], spin_until: SpinUntil, folder: Path, **options: Any
-    ) -> None:
+    def __init__(self, make_node: MakeNode, spin_until: SpinUntil, folder: Path, **options: Any) -> None:
         assert isinstance(hold.monotonic, Clock)
         self._clock = hold.monotonic
+        self._make_node = make_node
         overrides = {"port": free_port(), "settings": str(folder)} | options
-        self.program = self.service(make_node, "operator_page", operator_page.wire, **overrides)
-        self.switch = self.service(make_node, "dead_mans_switch", dead_mans_switch.wire, rate=20.0)
-        self.l1 = self.service(
-            make_node, "config_l1", lambda node: config_publisher.wire(node, CONFIGURATION["l1"])
-        )
+        self.program = self.service("operator_page", operator_page.wire, **overrides)
+        self.switch = self.service("dead_mans_switch", dead_mans_switch.wire, rate=20.0)
+        self.l1 = self.service("config_l1", lambda node: config_publisher.wire(node, CONFIGURATION["l1"]))
         self.folder = folder
         self.heartbeats: list[float] = []
         self.commands: list[str] = []
         observer = make_node("observer")
         observer.create_subscription(
-            Bool, "operator_heartbeat", self._on_heartbeat, topics.OPERATOR_HEARTBEAT.qos
+            Bool,
+            "operator_heartbeat",
+            lambda _: self.heartbeats.append(time.monotonic()),
+            topics.OPERATOR_HEARTBEAT.qos,
         )
         observer.create_subscription(
             String, "engines", lambda it: self.commands.append(it.data), topics.ENGINES.qos
@@ -140,17 +138,11 @@ class World:
         self.hand: Hand | None = None  # at a terminal that lives
         self._spin_until = spin_until
 
-    @staticmethod
-    def service(
-        make_node: Callable[..., Any], name: str, wire: Callable[[Any], None], **values: Any
-    ) -> ServiceNode:
+    def service(self, name: str, wire: Callable[[Any], None], **values: Any) -> ServiceNode:
         overrides = [Parameter(key, value=value) for key, value in values.items()]
-        node: ServiceNode = make_node(name, kind=ServiceNode, parameter_overrides=overrides)
+        node: ServiceNode = self._make_node(name, kind=ServiceNode, parameter_overrides=overrides)
         wire(node)
         return node
-
-    def _on_heartbeat(self, message: Bool) -> None:
-        self.heartbeats.append(time.monotonic())
 
     def until(self, condition: Callable[[], object]) -> None:
         def lives() -> bool:
@@ -202,7 +194,7 @@ def _clock(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hold, "monotonic", Clock())
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def heard(monkeypatch: pytest.MonkeyPatch) -> list[ParameterChange]:
     """What a terminal has heard of the switch: it lets go if it hears of another hand after a press."""
     heard: list[ParameterChange] = []
@@ -214,9 +206,18 @@ def heard(monkeypatch: pytest.MonkeyPatch) -> list[ParameterChange]:
     return heard
 
 
+MakeWorld = Callable[..., World]
+
+
 @pytest.fixture
-def world(make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path) -> World:
-    return World(make_node, spin_until, tmp_path)
+def make_world(make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path) -> MakeWorld:
+    """Make a world; its page has the given parameters."""
+    return partial(World, make_node, spin_until, tmp_path)
+
+
+@pytest.fixture
+def world(make_world: MakeWorld) -> World:
+    return make_world()
 
 
 def test_held_page_is_a_hand_on_the_switch(world: World) -> None:
@@ -281,7 +282,7 @@ def test_press_on_a_page_takes_the_switch_from_the_parameter(world: World) -> No
 
 
 @pytest.fixture
-def terminal(world: World, make_node: Callable[..., Any]) -> Hand:
+def terminal(world: World, make_node: MakeNode, heard: list[ParameterChange]) -> Hand:
     hand = Hand(make_node("terminal_7", kind=ReactiveNode))
     world.hand = hand
     world.for_seconds(0.5)  # it meets the switch
@@ -331,9 +332,7 @@ def test_release_of_a_hand_at_a_terminal_releases_a_page(
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
 
 
-def test_switch_that_is_not_there_is_taken_when_it_comes_back(
-    make_node: Callable[..., Any], world: World
-) -> None:
+def test_switch_that_is_not_there_is_taken_when_it_comes_back(world: World) -> None:
     world.set_pressed(True)
     with world.page() as page:
         world.until(lambda: page.shown["switch"]["by"] == "dead_mans_switch")
@@ -341,7 +340,7 @@ def test_switch_that_is_not_there_is_taken_when_it_comes_back(
         page.press()
         world.until(lambda: page.shown["switch"]["by"] == "this_page")
         world.for_seconds(remote.TIMEOUT + 0.5)
-        world.switch = World.service(make_node, "dead_mans_switch", dead_mans_switch.wire, pressed=True)
+        world.switch = world.service("dead_mans_switch", dead_mans_switch.wire, pressed=True)
         world.until(lambda: world.switch.get_parameter("pressed").value is False)
 
 
@@ -359,17 +358,15 @@ def test_line_tells_that_a_page_has_turned_the_engines_off(world: World) -> None
     assert line["text"] == "Turning off engines, as operator_page asked..."
 
 
-def test_page_shows_the_limits_of_this_arm(
-    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
-) -> None:
+def test_page_shows_the_limits_of_this_arm(make_world: MakeWorld) -> None:
     limits = {"silence": 2.0, "strikes": 5, "presence_timeout": 4.0}
-    with World(make_node, spin_until, tmp_path, **limits).page() as page:
+    with make_world(**limits).page() as page:
         assert {name: page.welcome[name] for name in limits} == limits
         assert page.welcome["off_within"] == 4.5
 
 
 def test_page_sees_the_operator_as_the_controller_of_this_arm_does(
-    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
+    make_node: MakeNode, make_world: MakeWorld
 ) -> None:
     watchdog, topic = make_node("watchdog"), topics.OPERATOR_PRESENCE
     publisher = watchdog.create_publisher(topic.type, topic.name, topic.qos)
@@ -377,7 +374,7 @@ def test_page_sees_the_operator_as_the_controller_of_this_arm_does(
     watchdog.create_timer(
         0.05, lambda: publisher.publish(Header(stamp=stamps.to_message(stamps.now() - age)))
     )
-    world = World(make_node, spin_until, tmp_path, max_presence_age=0.2)
+    world = make_world(max_presence_age=0.2)
     with world.page() as page:
         world.until(lambda: page.shown["operator"]["age"])
         assert not page.shown["operator"]["seen"]
@@ -404,7 +401,7 @@ def test_sources_are_given_back_to_the_scenario(world: World) -> None:
     assert page.refused[0]["request"] == "follow_scenario", "of the sources that are not there"
 
 
-def test_source_that_is_not_there_is_told(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_source_that_is_not_there_is_told(world: World) -> None:
     with world.page() as page:
         page.say("set", name="l2", value=1.0)
         world.until(lambda: page.refused)
@@ -439,9 +436,7 @@ def test_processes_are_left_alone_where_none_are_supervised(
         assert page.refused[0]["request"] == "process"
 
 
-def test_input_outside_the_protocol_is_counted_in_the_health(
-    world: World, make_node: Callable[..., Any]
-) -> None:
+def test_input_outside_the_protocol_is_counted_in_the_health(world: World, make_node: MakeNode) -> None:
     reports: list[Any] = []
     make_node("listener").create_subscription(
         topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, reports.append, topics.DIAGNOSTICS.qos
@@ -454,10 +449,10 @@ def test_input_outside_the_protocol_is_counted_in_the_health(
 
 
 def test_topics_are_observed_only_while_a_page_is_open(
-    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(operator_page, "LINGER", 0.2)
-    world = World(make_node, spin_until, tmp_path)
+    world = make_world()
 
     def observed() -> set[str]:
         return {each.topic_name for each in world.program.subscriptions}
@@ -469,10 +464,8 @@ def test_topics_are_observed_only_while_a_page_is_open(
     world.until(lambda: observed() == always)
 
 
-def test_page_that_opens_later_is_told_why_the_engines_are_off(
-    world: World, make_node: Callable[..., Any]
-) -> None:
-    world.service(make_node, "engine_controller", engine_controller.wire)
+def test_page_that_opens_later_is_told_why_the_engines_are_off(world: World) -> None:
+    world.service("engine_controller", engine_controller.wire)
     world.for_seconds(1.0)
 
     with world.page() as page:
@@ -480,10 +473,7 @@ def test_page_that_opens_later_is_told_why_the_engines_are_off(
         world.until(lambda: page.shown["engines"]["why"] == why)
 
 
-def test_page_ends_and_all_others_hear_of_the_end_of_the_context(
-    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path, context: Context
-) -> None:
-    World(make_node, spin_until, tmp_path)
+def test_page_ends_and_all_others_hear_of_the_end_of_the_context(world: World, context: Context) -> None:
     ended: list[str] = []
     for name in ("first", "second"):
         context.on_shutdown(partial(ended.append, name))
@@ -493,19 +483,15 @@ def test_page_ends_and_all_others_hear_of_the_end_of_the_context(
     assert ended == ["first", "second"]
 
 
-def test_taken_port_disables_the_page_and_nothing_else(
-    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
-) -> None:
+def test_taken_port_disables_the_page_and_nothing_else(make_world: MakeWorld, tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
-        World(make_node, spin_until, tmp_path, port=port)
+        make_world(port=port)
     line = (tmp_path / PAGE_FILE).read_text()
     assert line == f"No page: port {port} of 127.0.0.1 is taken: choose another one with WEB=<port>\n"
 
 
-def test_port_0_disables_the_page(
-    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
-) -> None:
-    World(make_node, spin_until, tmp_path, port=0)
+def test_port_0_disables_the_page(make_world: MakeWorld, tmp_path: Path) -> None:
+    make_world(port=0)
 
     assert not (tmp_path / PAGE_FILE).exists()
