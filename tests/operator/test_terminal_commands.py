@@ -36,8 +36,6 @@ from reactive_node import ReactiveNode
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from services import dead_mans_switch
 
-Live = Callable[[Callable[[], object]], None]
-
 
 class Clock:
     """The clock of the hand: it goes on while the terminal lives, so no busy machine releases the hand."""
@@ -50,10 +48,18 @@ class Clock:
 
 
 class Operator:
-    def __init__(self, node: Node, terminal: Terminal, keyboard: RawIOBase) -> None:
+    def __init__(self, node: Node, terminal: Terminal, keyboard: RawIOBase, executor: Executor) -> None:
         self.node = node
+        self.said: list[str] = []
+        """What the terminal says of the hand."""
         self._terminal = terminal
         self._keyboard = keyboard
+        self._executor = executor
+
+    def say(self, line: str) -> None:
+        found = re.fullmatch(r"\[\d+\] ((Released|Another hand|dead_mans_switch).*)", line)
+        if found and threading.current_thread() is threading.main_thread():  # that of the executor
+            self.said.append(found[1])
 
     def type(self, word: str) -> None:
         self._keyboard.write(f"{word}\n".encode())
@@ -67,9 +73,29 @@ class Operator:
         hold.monotonic.now += program.PERIOD
         self._terminal.refresh()
 
+    def live_until(self, condition: Callable[[], object]) -> None:
+        """Let the terminal live, as `make terminal` does, until a condition is true."""
+        deadline = time.monotonic() + 60.0
+        while not condition():
+            assert time.monotonic() < deadline, "the condition was not true in time"
+            self._executor.spin_until_future_complete(Future(), timeout_sec=0.01)
+            self.live()
+
+    def live_for(self, seconds: float) -> None:
+        """Let the terminal live for some seconds, or longer where the machine pauses."""
+        turns = iter(range(round(seconds / program.PERIOD)))
+        self.live_until(lambda: next(turns, None) is None)
+
+    def assert_silence(self, switch: Switch) -> None:
+        """Nothing is heard of the operator any more, but for a heartbeat on its way."""
+        self.live_for(0.2)
+        switch.heartbeats.clear()
+        self.live_for(0.5)
+        assert switch.heartbeats == []
+
 
 @pytest.fixture
-def operator(make_node: MakeNode, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
+def operator(make_node: MakeNode, executor: Executor, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
     monkeypatch.setattr(program, "AGAIN", 0.2)
     monkeypatch.setattr(program, "PERIOD", 0.01)
     monkeypatch.setattr(hand, "LONGEST_PAUSE", 0.5)
@@ -80,7 +106,9 @@ def operator(make_node: MakeNode, monkeypatch: pytest.MonkeyPatch) -> Iterator[O
         monkeypatch.setattr(sys, "stdin", keyboard)
         node = make_node("terminal", kind=ReactiveNode)
         with Terminal(node, time.monotonic()) as terminal:
-            yield Operator(node, terminal, typing)
+            operator = Operator(node, terminal, typing, executor)
+            monkeypatch.setattr(plain, "say", operator.say)
+            yield operator
 
 
 class Controller:
@@ -146,56 +174,28 @@ class Switch:
 
 
 @pytest.fixture
-def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What the terminal says of the hand, each with its time."""
-    said: list[str] = []
-
-    def say(line: str) -> None:
-        found = re.fullmatch(r"\[\d+\] ((Released|Another hand|dead_mans_switch).*)", line)
-        if found and threading.current_thread() is threading.main_thread():  # that of the executor
-            said.append(found[1])
-
-    monkeypatch.setattr(plain, "say", say)
-    return said
-
-
-@pytest.fixture
-def live_until(operator: Operator, executor: Executor) -> Live:
-    """Lets the terminal live, as `make terminal` does, until a condition is true."""
-
-    def until(condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + 60.0
-        while not condition():
-            assert time.monotonic() < deadline, "the condition was not true in time"
-            executor.spin_until_future_complete(Future(), timeout_sec=0.01)
-            operator.live()
-
-    return until
-
-
-@pytest.fixture
-def held(operator: Operator, make_node: MakeNode, live_until: Live) -> Switch:
+def held(operator: Operator, make_node: MakeNode) -> Switch:
     switch = Switch(make_node, pressed=True)
     operator.type("press")
-    live_until(lambda: not switch.pressed)
+    operator.live_until(lambda: not switch.pressed)
     switch.heartbeats.clear()
-    live_until(lambda: len(switch.heartbeats) > 5)
+    operator.live_until(lambda: len(switch.heartbeats) > 5)
     return switch
 
 
 @pytest.mark.timed
 def test_terminal_that_holds_sends_the_heartbeats_itself(
-    held: Switch, operator: Operator, live_until: Live, said: list[str], monkeypatch: pytest.MonkeyPatch
+    held: Switch, operator: Operator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     an_hour_ago = datetime.now(UTC) - timedelta(hours=1)  # the time of day is set back
     monkeypatch.setattr("reactivex.scheduler.scheduler.default_now", lambda: an_hour_ago)
     held.hands.clear()
-    live_until(lambda: held.hands)
+    operator.live_until(lambda: held.hands)
 
     assert {it.frame_id for it in held.hands} == {operator.node.get_name()}
     assert {it.data for it in held.heartbeats} == {True}
     assert not held.pressed
-    assert said == []
+    assert operator.said == []
 
 
 def test_terminal_beats_as_often_as_a_switch_and_may_stand_still_for_a_second() -> None:
@@ -203,86 +203,63 @@ def test_terminal_beats_as_often_as_a_switch_and_may_stand_still_for_a_second() 
 
 
 @pytest.mark.timed
-def test_release_ends_the_heartbeats(
-    held: Switch, operator: Operator, live_until: Live, said: list[str]
-) -> None:
+def test_release_ends_the_heartbeats(held: Switch, operator: Operator) -> None:
     operator.type("release")
-    assert_silence(held, live_until)
-    assert said == []
+    operator.assert_silence(held)
+    assert operator.said == []
 
 
 @pytest.mark.timed
-def test_terminal_that_stood_still_has_to_press_again(
-    held: Switch, operator: Operator, live_until: Live, said: list[str]
-) -> None:
+def test_terminal_that_stood_still_has_to_press_again(held: Switch, operator: Operator) -> None:
     assert isinstance(hold.monotonic, Clock)
     hold.monotonic.now += 2 * hand.LONGEST_PAUSE
-    assert_silence(held, live_until)
-    assert len(said) == 1
-    assert re.fullmatch(hand.PAUSED.format(r"no beat came for \d+ ms"), said[0])
+    operator.assert_silence(held)
+    assert len(operator.said) == 1
+    assert re.fullmatch(hand.PAUSED.format(r"no beat came for \d+ ms"), operator.said[0])
 
     operator.type("press")
     held.heartbeats.clear()
-    live_until(lambda: len(held.heartbeats) > 5)
+    operator.live_until(lambda: len(held.heartbeats) > 5)
 
 
 @pytest.mark.timed
-def test_end_of_the_input_ends_the_hand_but_not_the_terminal(
-    held: Switch, operator: Operator, live_until: Live, said: list[str]
-) -> None:
+def test_end_of_the_input_ends_the_hand_but_not_the_terminal(held: Switch, operator: Operator) -> None:
     operator.end_input()
-    live_until(lambda: said)
-    assert said == [hand.INPUT_ENDED]
-    assert_silence(held, live_until)
+    operator.live_until(lambda: operator.said)
+    assert operator.said == [hand.INPUT_ENDED]
+    operator.assert_silence(held)
 
 
 @pytest.mark.parametrize("pressed", [False, True])
 @pytest.mark.timed
 def test_another_hand_takes_the_switch_from_the_terminal(
-    held: Switch, live_until: Live, said: list[str], pressed: bool
+    held: Switch, operator: Operator, pressed: bool
 ) -> None:
     held.set(pressed)
-    live_until(lambda: said)
-    assert said == [hand.TAKEN]
+    operator.live_until(lambda: operator.said)
+    assert operator.said == [hand.TAKEN]
     held.set(False)
-    assert_silence(held, live_until)
+    operator.assert_silence(held)
 
 
 @pytest.mark.timed
 def test_death_of_the_virtual_switch_releases_no_terminal(
-    held: Switch, live_until: Live, make_node: MakeNode
+    held: Switch, operator: Operator, make_node: MakeNode
 ) -> None:
     held.node.destroy_node()
     successor = Switch(make_node)
-    live_until(lambda: len(successor.heartbeats) > 5)
+    operator.live_until(lambda: len(successor.heartbeats) > 5)
     assert not successor.pressed
 
 
-def assert_silence(switch: Switch, live_until: Live) -> None:
-    """Nothing is heard of the operator any more, but for a heartbeat on its way."""
-    live_for(0.2, live_until)
-    switch.heartbeats.clear()
-    live_for(0.5, live_until)
-    assert switch.heartbeats == []
-
-
-def live_for(seconds: float, live_until: Live) -> None:
-    """Let the terminal live for some seconds, or longer where the machine pauses."""
-    turns = iter(range(round(seconds / program.PERIOD)))
-    live_until(lambda: next(turns, None) is None)
-
-
 def test_release_reaches_the_successor_of_a_hung_switch(
-    operator: Operator,
-    make_node: MakeNode,
-    spin_until: SpinUntil,
-    said: list[str],
+    operator: Operator, make_node: MakeNode, spin_until: SpinUntil
 ) -> None:
     hung = Node("dead_mans_switch", context=operator.node.context)  # nothing spins it
     try:
         operator.type("release")
-        spin_until(lambda: said)
-        assert said == ["dead_mans_switch does not answer: trying again until it does"]
+        spin_until(lambda: operator.said)
+        assert operator.said == ["dead_mans_switch does not answer: trying again until it does"]
     finally:
         hung.destroy_node()
     switch = Switch(make_node, pressed=True)
@@ -290,12 +267,12 @@ def test_release_reaches_the_successor_of_a_hung_switch(
     spin_until(lambda: not switch.pressed)
 
 
-def test_newest_command_to_the_switch_wins(operator: Operator, make_node: MakeNode, live_until: Live) -> None:
+def test_newest_command_to_the_switch_wins(operator: Operator, make_node: MakeNode) -> None:
     operator.type("press")
     operator.type("release")
     switch = Switch(make_node, pressed=True)
 
-    live_until(lambda: not switch.pressed)
-    live_for(1.5 * remote.TIMEOUT, live_until)
-    assert_silence(switch, live_until)
+    operator.live_until(lambda: not switch.pressed)
+    operator.live_for(1.5 * remote.TIMEOUT)
+    operator.assert_silence(switch)
     assert not switch.pressed
