@@ -14,7 +14,6 @@ PROCESSES = (
     "deploy/tools/tests/cli",
     "tests/benchmarks",
     "tests/operator/page/browser",
-    "tests/operator/page/test_live_page.py",
     "tests/security/attacks",
     "tests/simulation_kit/tests/test_against_cyclone_dds.py",
     "tests/system",

@@ -24,6 +24,7 @@ from deploy.operator import hand, hold, operator_page, remote
 from deploy.operator.hand import Hand
 from deploy.operator.page.server import UPDATE_PERIOD
 from deploy.operator.remote import ParameterChange, parameter_changes
+from deploy.supervision import manifest
 from deploy.supervision.run_directory import PAGE_FILE
 from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN
@@ -446,6 +447,26 @@ def test_input_outside_the_protocol_is_counted_in_the_health(world: World, make_
         world.until(
             lambda: False if not reports else any("a message has no known type" in str(it) for it in reports)
         )
+
+
+def test_page_reads_and_publishes_what_the_contract_says(world: World) -> None:
+    contract = {topic.full_name("/"): topic for topic in topics.CONTRACT}
+    for_a_while = {topics.DRIVEN_TIME.full_name("/")}  # until it knows whether there is a drive
+
+    def promised(role: str) -> set[str]:
+        ours = {manifest.PAGE, topics.EVERY_SERVICE}
+        return {name for name, topic in contract.items() if ours & set(getattr(topic, role))}
+
+    def used(endpoints: Any) -> set[str]:
+        return {each.topic_name for each in endpoints} & contract.keys()
+
+    with world.page():
+        world.until(
+            lambda: used(world.program.subscriptions) | for_a_while == promised("subscribers") | for_a_while
+        )
+    assert used(world.program.publishers) == promised("publishers")
+    servers = {client.srv_name.split("/")[-2] for client in world.program.clients}
+    assert servers == {*topics.PARAMETER_CLIENTS[manifest.PAGE]}
 
 
 def test_topics_are_observed_only_while_a_page_is_open(

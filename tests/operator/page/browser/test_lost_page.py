@@ -10,6 +10,7 @@ import os
 import signal
 import time
 from contextlib import closing
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -17,7 +18,7 @@ import pytest
 from tests.system.sites import LIMIT
 
 from . import chromium
-from .arm import GONE, LINK, Arm, hold_with_engines_on
+from .arm import GONE, LINK, Arm, hold_with_engines_on, undisturbed
 from .chromium import HandOnPage
 from .link import Link
 
@@ -92,6 +93,21 @@ def test_stopped_program_releases_and_resumes_released(arm: Arm, hand: HandOnPag
     arm.record.silence_after(stopped, HELD_UP + 1.0)
     hand.up()
     hand.hold()
+
+
+@undisturbed
+def test_hand_survives_the_death_of_other_programs(arm: Arm, hand: HandOnPage) -> None:
+    for program in ("dead_mans_switch", "dead_mans_switch", "operator_watchdog", "sentinel", "config_l1"):
+        hold_with_engines_on(arm, hand)
+        pid = arm.site.members[program]
+        os.kill(pid, signal.SIGKILL)
+        killed = time.time()
+        arm.site.await_members(lambda members, pid=pid, program=program: members.get(program, pid) != pid)
+        time.sleep(1.0)
+        beats = arm.record.beats_after(killed - 0.2)
+        assert max(later - earlier for earlier, later in pairwise(beats)) <= 0.25, program
+        assert hand.state == "held", program
+        hand.up()
 
 
 def test_queued_beats_count_for_nothing(arm: Arm, browser: Any, link: Link) -> None:
