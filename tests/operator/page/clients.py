@@ -89,9 +89,14 @@ class Arm:
     @contextlib.contextmanager
     def page(self) -> Iterator[ClientConnection]:
         with self.connect() as page:
-            page.send(json.dumps({"type": "hello", "token": TOKEN}))
-            assert message(page)["type"] == "welcome"
+            assert hello(page)["type"] == "welcome"
             yield page
+
+
+def hello(page: ClientConnection) -> Any:
+    """Say hello; return the answer."""
+    page.send(json.dumps({"type": "hello", "token": TOKEN}))
+    return message(page)
 
 
 def message(page: ClientConnection) -> Any:

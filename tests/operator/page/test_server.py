@@ -25,7 +25,7 @@ from deploy.operator.holder import Holder
 from deploy.operator.page import address, protocol, server, state
 from deploy.operator.page.state import PageState
 from interfaces.reactive_node.tests.leftovers import assert_nothing_is_left
-from tests.operator.page.clients import TOKEN, Arm, SleepyPage, close_code, end, message, update
+from tests.operator.page.clients import TOKEN, Arm, SleepyPage, close_code, end, hello, update
 
 
 @pytest.fixture
@@ -108,26 +108,22 @@ def test_second_host_header_is_refused(arm: Arm) -> None:
     assert b" 403 " in answer
 
 
-@pytest.mark.parametrize("host", ["localhost:9000", "127.0.0.1:9000", "localhost"])
-def test_page_is_reached_by_a_tunnel_on_another_port(arm: Arm, host: str) -> None:
+@pytest.mark.parametrize(
+    ("host", "scheme", "is_local"),
+    [
+        *((host, "http", True) for host in ("localhost", "localhost:9000", "127.0.0.1:9000")),
+        *((host, "https", False) for host in ("arm.example", "arm.example:8443")),
+    ],
+)
+def test_page_is_reached_by_a_tunnel_and_by_a_proxy_that_ends_tls(
+    arm: Arm, host: str, scheme: str, is_local: bool
+) -> None:
+    """A tunnel has another port; the user of a proxy may be anywhere."""
     assert arm.get("/", Host=host)[0] == 200
-    tunnel = socket.create_connection(("127.0.0.1", arm.port))
-    with connect(
-        f"ws://{host}/socket", sock=tunnel, origin=Origin(f"http://{host}"), compression=None
-    ) as page:
-        page.send(json.dumps({"type": "hello", "token": TOKEN}))
-        assert message(page)["type"] == "welcome"
-
-
-@pytest.mark.parametrize("host", ["arm.example", "arm.example:8443"])
-def test_reverse_proxy_that_ends_tls_passes_on_name_and_origin(arm: Arm, host: str) -> None:
-    assert arm.get("/", Host=host)[0] == 200
-    proxy = socket.create_connection(("127.0.0.1", arm.port))
-    with connect(
-        f"ws://{host}/socket", sock=proxy, origin=Origin(f"https://{host}"), compression=None
-    ) as page:
-        page.send(json.dumps({"type": "hello", "token": TOKEN}))
-        assert message(page)["local"] is False, "its user may be anywhere"
+    client = socket.create_connection(("127.0.0.1", arm.port))
+    origin = Origin(f"{scheme}://{host}")
+    with connect(f"ws://{host}/socket", sock=client, origin=origin, compression=None) as page:
+        assert hello(page)["local"] is is_local
 
 
 def test_reverse_proxy_that_hides_the_name_is_told_what_to_do(arm: Arm) -> None:
@@ -139,8 +135,7 @@ def test_reverse_proxy_that_hides_the_name_is_told_what_to_do(arm: Arm) -> None:
 @pytest.mark.parametrize("header", ["X-Forwarded-For", "x-forwarded-host", "Forwarded"])
 def test_page_behind_a_proxy_is_not_local(arm: Arm, header: str) -> None:
     with arm.connect(additional_headers={header: "1"}) as page:
-        page.send(json.dumps({"type": "hello", "token": TOKEN}))
-        assert message(page)["local"] is False
+        assert hello(page)["local"] is False
 
 
 # The token
@@ -174,8 +169,7 @@ def test_press_before_hello_closes_the_connection(arm: Arm) -> None:
 
 def test_welcome_says_what_the_page_needs(arm: Arm) -> None:
     with arm.connect() as page:
-        page.send(json.dumps({"type": "hello", "token": TOKEN}))
-        welcome = message(page)
+        welcome = hello(page)
 
     assert {key: welcome[key] for key in ("type", "local", "strikes")} == {
         "type": "welcome",
@@ -263,8 +257,7 @@ def test_page_that_opens_later_gets_the_history(arm: Arm) -> None:
     with arm.page() as page:
         update(page)
         with arm.connect() as later:
-            later.send(json.dumps({"type": "hello", "token": TOKEN}))
-            ((time, moment),) = message(later)["history"]
+            ((time, moment),) = hello(later)["history"]
     assert (time, moment["switch"]) == (1.25, {"held": True, "by": "terminal"})
 
 
@@ -330,11 +323,9 @@ def test_page_that_does_not_answer_makes_room(arm: Arm) -> None:
             arm.next(server.Opened)
         deadline = time.monotonic() + 5.0
         while True:
-            with arm.connect() as page:
-                page.send(json.dumps({"type": "hello", "token": TOKEN}))
-                with contextlib.suppress(ConnectionClosed):
-                    assert message(page)["type"] == "welcome"
-                    break
+            with arm.connect() as page, contextlib.suppress(ConnectionClosed):
+                assert hello(page)["type"] == "welcome"
+                break
             assert time.monotonic() < deadline, "its place stays taken"
         assert arm.next(server.Closed).page == silent
 
