@@ -39,16 +39,6 @@ except KeyboardInterrupt:
 finally:
     terminal.close()
 """
-# Shows one line only, and reads until the input ends.
-SILENT_PROGRAM = """
-from contextlib import suppress
-from deploy.operator.terminal.display import open_display
-terminal = open_display([])
-terminal.show(["line 0"])
-with suppress(EOFError):
-    while True:
-        terminal.read(0.05)
-"""
 # Its prompt makes room for a line, and does not come back.
 STUCK_PROGRAM = f"""
 import os, threading
@@ -58,11 +48,12 @@ def erase(renderer):
     threading.Event().wait()
 Renderer.erase = erase
 {PROGRAM}"""
-# Keeps a line in view, which changes when something is typed.
+# Shows one line, and keeps another one in view, which changes when something is typed.
 STATE_PROGRAM = """
 from contextlib import suppress
 from deploy.operator.terminal.display import open_display
 terminal = open_display([])
+terminal.show(["line 0"])
 terminal.show_state([("good", "Engines on"), ("idle", "Released")])
 with suppress(EOFError):
     while True:
@@ -241,7 +232,7 @@ def test_program_in_the_background_leaves_the_terminal_alone(user: User) -> None
 
 @pytest.mark.parametrize(
     "user",
-    [{"shell": NO_HANGUP, "term": term, "program": SILENT_PROGRAM} for term in ("xterm", "dumb")],
+    [{"shell": NO_HANGUP, "term": term, "program": STATE_PROGRAM} for term in ("xterm", "dumb")],
     indirect=True,
 )
 def test_closed_terminal_is_the_end_of_input(user: User) -> None:

@@ -70,6 +70,7 @@ window.announce = (type) => dispatchEvent(Object.assign(new Event(type), { gamep
 """
 """A gamepad, until it has `frozen`."""
 
+TABS = 100  # more than the page has stops
 DECIDED = "#hold[data-state=held], #hold[data-state=other_page], #hold-why:not(:empty)"
 """What the page has when a press has led to a hold or to a refusal."""
 
@@ -127,6 +128,27 @@ def signal_all(pids: list[int], number: signal.Signals) -> None:
             os.kill(pid, number)
         except ProcessLookupError:
             continue
+
+
+class Fingers:
+    """Fingers on a touch screen."""
+
+    def __init__(self, page: Any) -> None:
+        self._session = page.context.new_cdp_session(page)
+        self._down: dict[int, tuple[float, float]] = {}
+
+    def put(self, finger: int, point: tuple[float, float]) -> None:
+        kind = "touchMove" if finger in self._down else "touchStart"
+        self._down[finger] = point
+        self._dispatch(kind, self._down)
+
+    def lift(self, finger: int = 0) -> None:
+        point = self._down.pop(finger)
+        self._dispatch("touchEnd", {finger: point} if self._down else {})
+
+    def _dispatch(self, kind: str, fingers: dict[int, tuple[float, float]]) -> None:
+        points = [{"id": finger, "x": x, "y": y} for finger, (x, y) in fingers.items()]
+        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
 class HandOnPage:
@@ -192,6 +214,17 @@ class HandOnPage:
             assert self.stalled, f"not held: {self.state}, {self.why!r}"
             assert time.monotonic() < deadline, "the machine stands still all the time"
             (up or self.up)()
+
+    def tab_to(self, selector: str) -> None:
+        for _ in range(TABS):
+            if self.page.evaluate(f"document.activeElement.matches('{selector}')"):
+                return
+            self.tab()
+            self.await_drawing()
+        raise AssertionError(f"Tab does not lead to {selector}")
+
+    def tab(self) -> None:
+        self.page.keyboard.press("Tab")
 
     def await_drawing(self) -> None:
         self.page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")

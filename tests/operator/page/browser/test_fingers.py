@@ -12,7 +12,7 @@ import pytest
 from tests.system.sites import LIMIT
 
 from .arm import Arm
-from .chromium import HandOnPage
+from .chromium import Fingers, HandOnPage
 
 pytestmark = pytest.mark.timed
 
@@ -26,16 +26,15 @@ class Finger:
 
     def __init__(self, hand: HandOnPage) -> None:
         self.hand = hand
-        self._session = hand.context.new_cdp_session(hand.page)
+        self._fingers = Fingers(hand.page)
 
     def move(self, across: float, along: float) -> None:
         """Touch the slider beside its thumb, move, and lift; [px]."""
         box = self.hand.page.locator("#set-theta1").bounding_box()
         x, y = box["x"] + box["width"] * 0.2, box["y"] + box["height"] / 2
-        self._touch("touchStart", x, y)
-        for step in range(1, STEPS + 1) if across or along else ():
-            self._touch("touchMove", x + across * step / STEPS, y + along * step / STEPS)
-        self._session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        for step in range(STEPS + 1) if across or along else (0,):
+            self._fingers.put(0, (x + across * step / STEPS, y + along * step / STEPS))
+        self._fingers.lift()
         self.hand.await_drawing()
 
     def joints_set(self) -> set[str]:
@@ -46,9 +45,6 @@ class Finger:
         self.hand.page.wait_for_selector("#source-theta2[data-source=hand]")
         names = self.hand.page.evaluate("sent.filter((it) => it.type === 'set').map((it) => it.name)")
         return set(names) - {"theta2"}
-
-    def _touch(self, kind: str, x: float, y: float) -> None:
-        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y}]})
 
 
 @pytest.fixture

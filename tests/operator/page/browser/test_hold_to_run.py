@@ -17,7 +17,7 @@ import pytest
 from tests.operator.page.browser import pauses
 
 from .arm import GONE, Arm, hold_with_engines_on, undisturbed
-from .chromium import PAD, HandOnPage
+from .chromium import PAD, Fingers, HandOnPage
 
 pytestmark = pytest.mark.timed
 
@@ -39,25 +39,6 @@ window.Date = class extends Date {
     static now() { return super.now() + HOURS * 3600e3; }
 };
 """
-
-
-class Fingers:
-    def __init__(self, hand: HandOnPage) -> None:
-        self._session = hand.context.new_cdp_session(hand.page)
-        self._down: dict[int, tuple[float, float]] = {}
-
-    def put(self, finger: int, point: tuple[float, float]) -> None:
-        kind = "touchMove" if finger in self._down else "touchStart"
-        self._down[finger] = point
-        self._dispatch(kind, self._down)
-
-    def lift(self, finger: int = 0) -> None:
-        point = self._down.pop(finger)
-        self._dispatch("touchEnd", {finger: point} if self._down else {})
-
-    def _dispatch(self, kind: str, fingers: dict[int, tuple[float, float]]) -> None:
-        points = [{"id": finger, "x": x, "y": y} for finger, (x, y) in fingers.items()]
-        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
 def test_hand_is_released_within_150_ms_at_p99(arm: Arm, hand: HandOnPage) -> None:
@@ -248,7 +229,7 @@ def test_screen_stays_on_while_a_hand_holds(arm: Arm, hand: HandOnPage) -> None:
 
 @undisturbed
 def test_second_finger_changes_nothing(arm: Arm, hand: HandOnPage) -> None:
-    fingers = Fingers(hand)
+    fingers = Fingers(hand.page)
     hold_with_engines_on(arm, hand, lambda: fingers.put(0, hand.point()), fingers.lift)
     hand.page.wait_for_selector("#engines[data-state=on]", timeout=5000)  # no note moves the buttons any more
     box = hand.page.locator("#turn-off").bounding_box()

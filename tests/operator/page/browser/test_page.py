@@ -36,7 +36,6 @@ LEGIBLE = 11  # px, the height of the letters' box
 CONTROLS = ("button", "slider", "spinbutton")
 NAMED = (*CONTROLS, "link", "textbox", "image", "table", "region")
 WAIT = 1000 * LIMIT  # ms
-TABS = 100  # more than the page has stops
 GREY = 0.5  # s
 SAMPLES = 5
 
@@ -202,11 +201,11 @@ def test_address_without_its_token_shows_nothing(arm: Arm, browser: Any) -> None
 
 def test_keyboard_alone_moves_the_arm_and_kills_a_process(arm: Arm, hand: HandOnPage) -> None:
     keyboard = hand.page.keyboard
-    tab_to(hand, "#set-theta1")
+    hand.tab_to("#set-theta1")
     for _ in range(10):
         keyboard.press("ArrowRight")
     hand.page.wait_for_selector("#source-theta1[data-source=hand]", timeout=WAIT)
-    tab_to(hand, "#follow-scenario")
+    hand.tab_to("#follow-scenario")
     keyboard.press("Enter")  # too short: the arm would jump
     hand.page.wait_for_selector("#set-note:text('jumps')", timeout=WAIT)
     assert hand.sent("follow_scenario") == 0
@@ -215,7 +214,7 @@ def test_keyboard_alone_moves_the_arm_and_kills_a_process(arm: Arm, hand: HandOn
     keyboard.up("Enter")
 
     killed = arm.site.members["kinematics"]
-    tab_to(hand, "tr[data-process=kinematics] [data-action=kill]")
+    hand.tab_to("tr[data-process=kinematics] [data-action=kill]")
     keyboard.press("Enter")  # too short
     hand.page.wait_for_selector("#process-note:not([hidden])", timeout=WAIT)
     assert arm.site.members["kinematics"] == killed
@@ -317,14 +316,6 @@ def replay_until(hand: HandOnPage, selector: str) -> None:
 def is_disconnected(hand: HandOnPage) -> bool:
     """Whether the page says that nothing was killed because it was not connected; its user holds again."""
     return "not connected" in (hand.page.text_content("#process-note") or "")
-
-
-def tab_to(hand: HandOnPage, selector: str) -> None:
-    for _ in range(TABS):
-        if hand.page.evaluate("it => document.activeElement.matches(it)", selector):
-            return
-        hand.page.keyboard.press("Tab")
-    raise AssertionError(f"Tab does not lead to {selector}")
 
 
 def test_page_shows_real_joints_and_does_not_set_them(
