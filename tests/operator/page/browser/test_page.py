@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import signal
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 from std_msgs.msg import Float64
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin
 
 from deploy.operator.page.server import MAX_PAGES
 from deploy.supervision import manifest
 from interfaces import topics
+from tests.operator.page.clients import Hand
 from tests.system.records import engine_states
 from tests.system.sites import LIMIT, Peer
 
@@ -364,10 +360,7 @@ def test_page_works_where_the_browser_stores_nothing(hand: HandOnPage) -> None:
 
 def test_page_that_is_one_too_many_says_so_and_opens_when_another_closes(arm: Arm, browser: Any) -> None:
     with ExitStack() as opened, closing(browser.new_context()) as context:
-        pages = []
-        with suppress(ConnectionClosed):
-            while len(pages) <= MAX_PAGES:
-                pages.append(opened.enter_context(connected(arm)))
+        pages = [opened.enter_context(closing(Hand(arm.url))) for _ in range(MAX_PAGES)]
         page = context.new_page()
         page.goto(arm.url)
         page.wait_for_selector("#banner-text:text('8 pages are open already')", timeout=WAIT)
@@ -375,16 +368,6 @@ def test_page_that_is_one_too_many_says_so_and_opens_when_another_closes(arm: Ar
         pages[0].close()
         page.wait_for_selector("html[data-connection=live]", timeout=WAIT)
         assert page.is_hidden("#banner")
-
-
-@contextmanager
-def connected(arm: Arm) -> Iterator[ClientConnection]:
-    """Open the connection of a page that answers."""
-    base, _, token = arm.url.partition("#")
-    with connect(f"{base.replace('http', 'ws')}socket", origin=Origin(base.rstrip("/"))) as page:
-        page.send(json.dumps({"type": "hello", "token": token}))
-        assert json.loads(page.recv(LIMIT))["type"] == "welcome"
-        yield page
 
 
 def test_stopped_motion_leaves_no_speed(arm: Arm, hand: HandOnPage) -> None:
