@@ -325,30 +325,6 @@ def test_page_from_the_history_begins_released(arm: Arm, hand: HandOnPage) -> No
     arm.record.silence_after(left)
 
 
-@undisturbed
-def test_second_page_is_refused_while_the_first_holds(arm: Arm, hand: HandOnPage) -> None:
-    other = HandOnPage(hand.context, arm.url)
-    try:
-        hold_with_engines_on(arm, hand)
-        other.await_state("other_page")
-        other.down()
-        other.page.wait_for_selector("#hold-why:not(:empty)", timeout=5000)
-        assert "another page holds" in other.why
-        assert (hand.state, other.state) == ("held", "other_page")
-        other.up()
-
-        hand.up()
-        hand.await_state("released")
-        arm.record.silence_after(time.time())
-        other.hold()
-        hand.await_state("other_page")
-        other.up()
-        other.await_state("released")
-        arm.record.silence_after(time.time())
-    finally:
-        other.page.close()
-
-
 CLOCKS = {f"{hours} h": ONE_HOUR_OFF.replace("HOURS", str(hours)) for hours in (-1, 1)}
 
 

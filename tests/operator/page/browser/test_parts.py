@@ -156,7 +156,7 @@ async () => {
 
 BUTTON = """
 async () => {
-    const { words, fuse } = await import("/static/hold_button.js");
+    const { words, fuse, holdState } = await import("/static/hold_button.js");
     const shown = (hold, state, stops_in) => words(hold, { state, stops_in }, 10.5).join(" | ");
     const welcome = { strikes: 3, silence: 3, presence_timeout: 10 };
     const left = (state, stops_in) => fuse({ engines: { state, stops_in }, welcome });
@@ -168,6 +168,7 @@ async () => {
             shown("held", null, null),
         ],
         [left("on", 9), left("on", 3), left("on", 0), left("on", null), left("off", null)],
+        ["this_page", "other_page", null].map((by) => holdState(true, { held: false }, { held: true, by })),
     ];
 }
 """
@@ -341,7 +342,7 @@ async (script) => {
         feed({ type: "tick", wall: now });
         if (state.held !== before) seen.push([now, state.why]);
     }
-    return [seen, state.held];
+    return [seen, state.held, state.why];
 }
 """
 
@@ -404,7 +405,11 @@ def test_strikes_are_told_as_strikes_that_are_left(page: Any) -> None:
 
 
 def test_button_tells_what_the_engines_do_and_what_happens_without_the_hand(page: Any) -> None:
-    assert page.evaluate(BUTTON) == [BUTTON_TOLD, [1, 1 / 3, 0, 0, 0]]
+    assert page.evaluate(BUTTON) == [
+        BUTTON_TOLD,
+        [1, 1 / 3, 0, 0, 0],
+        ["releasing", "other_page", "somebody"],
+    ]
 
 
 def test_chain_tells_who_makes_the_arm_safe_without_a_node(page: Any) -> None:
@@ -447,18 +452,30 @@ NO_SIGN = "Released: no sign"
 
 
 @pytest.mark.parametrize(
-    ("script", "expected"),
+    ("script", "ends"),
     [
-        ([(100, {"type": "down", "hand": "mouse"})], [[], True]),
-        ([(100, DOWN)], [[[3150, NO_SIGN]], False]),
-        ([(100, DOWN), (700, SIGN)], [[[1250, NO_SIGN]], False]),
-        ([(100, DOWN), *((at, SIGN) for at in range(700, 12000, 500))], [[], True]),
-        ([(100, DOWN), (700, SIGN), (750, SIGN | {"lasts": 9000})], [[[9800, NO_SIGN]], False]),
-        ([(100, DOWN), (700, SIGN | {"hand": "other"})], [[[3150, NO_SIGN]], False]),
-        ([(100, DOWN), (3200, SIGN)], [[[3150, NO_SIGN]], False]),
-        ([(100, DOWN), (200, DOWN)], [[], False]),
-        ([(100, DOWN), (200, DOWN | {"hand": "other"})], [[[3150, NO_SIGN]], False]),
+        ([(100, {"type": "down", "hand": "mouse"})], None),
+        ([(100, DOWN)], 3150),
+        ([(100, DOWN), (700, SIGN)], 1250),
+        ([(100, DOWN), *((at, SIGN) for at in range(700, 12000, 500))], None),
+        ([(100, DOWN), (700, SIGN), (750, SIGN | {"lasts": 9000})], 9800),
+        ([(100, DOWN), (700, SIGN | {"hand": "other"})], 3150),
+        ([(100, DOWN), (3200, SIGN)], 3150),
+        ([(100, DOWN), (200, DOWN | {"hand": "other"})], 3150),
     ],
 )
-def test_hand_counts_as_long_as_its_last_sign_of_life(page: Any, script: Any, expected: Any) -> None:
-    assert page.evaluate(SIGNS, script) == expected
+def test_hand_counts_as_long_as_its_last_sign_of_life(page: Any, script: Any, ends: int | None) -> None:
+    lost = [[ends, NO_SIGN]] if ends else []
+    assert page.evaluate(SIGNS, script) == [lost, not ends, NO_SIGN if ends else ""]
+
+
+@pytest.mark.parametrize(
+    ("event", "why"),
+    [
+        (DOWN, "Released: it was let go unnoticed, and pressed again"),
+        ({"type": "refused", "why": "another page holds"}, "Not held: another page holds"),
+        ({"type": "released", "why": "a beat came late"}, "Released: a beat came late"),
+    ],
+)
+def test_hold_ends_for_a_reason(page: Any, event: Any, why: str) -> None:
+    assert page.evaluate(SIGNS, [(100, DOWN), (200, event)]) == [[], False, why]
