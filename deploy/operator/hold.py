@@ -126,16 +126,14 @@ def heartbeats(holds: Observable[Hold]) -> Observable[bool]:
 
 
 class Nonces:
-    """The nonces that were sent to one page."""
+    """The nonces that were sent to one page; older ones than ``MAX_NONCE_AGE`` are forgotten."""
 
-    def __init__(self, max_age: float = MAX_NONCE_AGE) -> None:
-        """:param max_age: older nonces are forgotten [s]."""
-        self._max_age = max_age
+    def __init__(self) -> None:
         self._sent: deque[tuple[str, float]] = deque()
 
     def issue(self, now: float) -> str:
         """Return a new nonce that is sent now [s]."""
-        while self._sent and now - self._sent[0][1] > self._max_age:
+        while self._sent and now - self._sent[0][1] > MAX_NONCE_AGE:
             self._sent.popleft()
         nonce = secrets.token_hex(8)
         self._sent.append((nonce, now))

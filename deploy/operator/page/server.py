@@ -103,7 +103,7 @@ class PageServer:
         newest: Callable[[], PageState],
         clock: Clock,
         fail: Callable[[Exception], None],
-        tls: ssl.SSLContext | None = None,
+        tls: ssl.SSLContext | None,
     ) -> None:
         """Serve on a thread that calls ``receive`` with each event of a page.
 
