@@ -129,7 +129,7 @@ class SleepyPage:
     """A page that reads, and answers pings, only when the test asks for it."""
 
     def __init__(self, arm: Arm, tls: ssl.SSLContext | None = None) -> None:
-        self._socket = socket.create_connection(("127.0.0.1", arm.port), timeout=0.2)
+        self._socket = socket.create_connection(("127.0.0.1", arm.port), timeout=5.0)
         if tls is not None:
             self._socket = tls.wrap_socket(self._socket, server_hostname="127.0.0.1")
         self._protocol = ClientProtocol(parse_uri(f"ws://{arm.host}/socket"), origin=Origin(arm.origin))
@@ -143,6 +143,7 @@ class SleepyPage:
                 raise self._protocol.handshake_exc
         self._protocol.send_text(json.dumps({"type": "hello", "token": TOKEN}).encode())
         self._send()
+        self._socket.settimeout(0.2)
 
     def wake(self, seconds: float) -> list[Any]:
         """Read for some time; the messages."""
