@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
 
@@ -301,28 +302,25 @@ def test_page_that_loses_the_hand_releases(arm: Arm, hand: HandOnPage, way: str)
     assert why in hand.why
 
 
+def leave_and_go_back(page: Any) -> None:
+    page.goto("about:blank")
+    page.go_back()
+
+
+@pytest.mark.parametrize("load", [lambda page: page.reload(), leave_and_go_back], ids=["reload", "history"])
 @undisturbed
-def test_page_reloaded_while_held_begins_released(arm: Arm, hand: HandOnPage) -> None:
+def test_page_that_is_loaded_while_held_begins_released(
+    arm: Arm, hand: HandOnPage, load: Callable[[Any], None]
+) -> None:
     hold_with_engines_on(arm, hand)
-    hand.page.reload()
+    load(hand.page)
     hand.await_live()
-    reloaded = time.time()
+    loaded = time.time()
     hand.page.mouse.move(*hand.point())  # the hand is still down
     hand.await_state("released")
-    arm.record.silence_after(reloaded)
+    arm.record.silence_after(loaded)
     hand.up()
     hand.hold()
-
-
-@undisturbed
-def test_page_from_the_history_begins_released(arm: Arm, hand: HandOnPage) -> None:
-    hold_with_engines_on(arm, hand)
-    hand.page.goto("about:blank")
-    left = time.time() + GONE
-    hand.page.go_back()
-    hand.await_live()
-    hand.await_state("released")
-    arm.record.silence_after(left)
 
 
 CLOCKS = {f"{hours} h": ONE_HOUR_OFF.replace("HOURS", str(hours)) for hours in (-1, 1)}
