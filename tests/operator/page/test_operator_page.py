@@ -322,17 +322,6 @@ def test_page_takes_the_switch_from_a_hand_at_a_terminal(
         world.assert_silence()
 
 
-def test_release_of_a_hand_at_a_terminal_releases_a_page(
-    world: World, terminal: Hand, heard: list[ParameterChange]
-) -> None:
-    with world.page() as page:
-        page.press()
-        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
-        world.until(lambda: heard)
-        terminal.release()
-        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
-
-
 def test_switch_that_is_not_there_is_taken_when_it_comes_back(world: World) -> None:
     world.set_pressed(True)
     with world.page() as page:
