@@ -100,10 +100,7 @@ def test_a_name_may_contain_a_word_of_the_template(checkout: Path, name: str) ->
 @pytest.mark.parametrize(
     ("name", "error"),
     [
-        *(
-            (name, f"NAME={name}: {NO_NAME}")
-            for name in ("", "Torque", "../torque", "a__b", "a" * 31, "class")
-        ),
+        *((name, f"NAME={name}: {NO_NAME}") for name in NO_NAMES),
         ("kinematics", "NAME=kinematics: is taken by services/kinematics.py"),
         ("examples", "NAME=examples: is taken by services/examples"),
         ("listing_5_9", "NAME=listing_5_9: is taken by tests/component/test_listing_5_9.py"),
