@@ -84,16 +84,19 @@ def test_restarted_source_resumes_its_scenario(
 
     values = emitted(node, source.follow("value", source.player.scenario.configuration["l1"]))
 
-    spin_until(lambda: values == [2.0, 3.0])
+    spin_until(lambda: values[-1:] == [3.0])
+    assert values in ([2.0, 3.0], [3.0])  # a slow start skips what is over
 
 
 def test_restarted_source_does_not_repeat_events(make_source: MakeNode, spin_until: SpinUntil) -> None:
     node = make_source(scenario_epoch=time.monotonic() - 100.5)
     source = Source(node)
 
-    events = emitted(node, source.player.events(Events(((0.0, "a"), (100.0, "b"), (101.0, "c")))))
+    later = ((100.0 + number, "c") for number in range(1, 60))
+    events = emitted(node, source.player.events(Events(((0.0, "a"), (100.0, "b"), *later))))
 
-    spin_until(lambda: events == ["c"])
+    spin_until(lambda: events)
+    assert events[0] == "c"
 
 
 # The origin
