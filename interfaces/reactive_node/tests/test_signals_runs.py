@@ -12,7 +12,8 @@ import reactivex as rx
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.node import Node
-from reactivex import Observable
+from reactivex import Observable, abc
+from reactivex.disposable import Disposable
 from reactivex.notification import OnError
 from reactivex.subject import Subject
 from reactivex.testing import ReactiveTest
@@ -29,6 +30,7 @@ from interfaces.reactive_node.tests.arrivals import (
     items,
 )
 from reactive_node import ReactiveNode
+from reactive_node.scheduler import NodeScheduler
 from reactive_node.signals import (
     CERTAIN,
     Answer,
@@ -243,6 +245,53 @@ class _Clock(VirtualTime):
     @property
     def now(self) -> datetime:
         return datetime.fromtimestamp(self.time, UTC)
+
+
+@pytest.mark.parametrize(
+    ("is_simulated", "gained", "begins_again"),
+    [
+        (True, 0.0, False),  # the simulation is paused
+        (True, 101.0, False),  # 20 times as fast as the steady clock
+        (True, 101.1, True),
+        (True, -1.0, False),
+        (True, -1.1, True),
+        (False, 6.0, False),
+        (False, 6.1, True),
+        (False, 4.0, False),
+        (False, 3.9, True),
+    ],
+)
+def test_clock_of_a_node_begins_again_if_it_was_set(
+    monkeypatch: pytest.MonkeyPatch, is_simulated: bool, gained: float, begins_again: bool
+) -> None:
+    clock = _ClockOfNode(is_simulated)
+    monkeypatch.setattr("time.monotonic_ns", lambda: clock.steady)
+    found: list[Any] = []
+    samples = Subject[Any]()
+    hold(samples, lateness=LATENESS).sample(0.5).subscribe(found.append, scheduler=clock)
+    for stamps, steady in ((0.5, 0.5), (gained, 5.0), (3.0, 3.0)):  # 201 s is asked for, and not yet known
+        clock.pass_time(stamps, steady)
+        samples.on_next(stamped(stamps, clock.stamps))
+
+    assert (found[0].time != 201 * SECOND) == begins_again
+
+
+class _ClockOfNode(NodeScheduler):
+    """That of a node whose clocks stand still between two steps."""
+
+    def __init__(self, is_simulated: bool) -> None:
+        self.is_simulated = is_simulated
+        self.stamps, self.steady = 200_550 * MS, 50 * SECOND
+
+    def pass_time(self, stamps: float, steady: float) -> None:
+        self.stamps += round(stamps * SECOND)
+        self.steady += round(steady * SECOND)
+
+    def time_of_stamps(self) -> int:
+        return self.stamps
+
+    def schedule_relative(self, *_: Any, **__: Any) -> abc.DisposableBase:
+        return Disposable()
 
 
 # Subscribing and ending

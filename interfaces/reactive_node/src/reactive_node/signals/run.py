@@ -59,9 +59,9 @@ class Run:
         self._nodes: dict[Any, Any] = {}
         self._sources: list[Source] = []
         self._memories: list[Memory] = []
-        self._longest_wait = 0
-        """How long it takes at most until a value is known [ns]."""
         self._questions: Questions
+        self._longest_wait: int
+        """How long it takes at most until a value is known [ns]."""
         self._unforgotten = 0  # looks since the last clean-up
         self._timer = SerialDisposable()
         self._armed_for: int | None = None  # [ns]
