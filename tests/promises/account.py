@@ -1,4 +1,4 @@
-"""What led to a violation, in at most five lines: which message of which process, and what had died."""
+"""What led to a violation, in at most six lines: which message of which process, and what had died."""
 
 from __future__ import annotations
 
@@ -53,6 +53,7 @@ def account(history: History, promise: str, evidence: Evidence) -> list[str]:
             *_switch(history, beat),
             *_watchdog(history, since, evidence.time),
             *_controller(history, since, evidence.time),
+            *(_heard(history, DRIVE, evidence.time) if STILL in evidence.text else ()),
             *_ended(history, history.programs, since - BEFORE / 2, evidence.time),
         ]
         return [*lines, *_faults(history, since - BEFORE / 2, evidence.time)]

@@ -37,16 +37,18 @@ def joints_stand_in_time(history: History, found: Sequence[Effect]) -> Finding:
     for begin, end in gaps(alive, -math.inf, history.end) if alive else ():
         if end - begin <= allowed:
             continue
-        last = max(_last_move(history, joint, begin, end) for joint in topics.JOINTS)
-        if last == -math.inf:
+        moves = [move for joint in topics.JOINTS for move in _moves(history, joint, begin, end)]
+        if not moves:
             continue
+        last = max(before for before, _ in moves)
         blind = disturbing(found, SWITCH, begin, last, *MISSED)
         since = max([begin, *(min(each.end, last) for each in blind)])
         if since == -math.inf:
             evidence.append(Evidence(last, "a joint moved before the operator's first sign of life"))
         elif last - since > allowed:
             text = f"a joint still moved {last - since:.2f} s after the operator's last sign of life"
-            evidence.append(Evidence(since + allowed, text))
+            seen = min(after for before, after in moves if before - since > allowed)
+            evidence.append(Evidence(seen, text))
         elif last - begin > allowed:
             unknown += 1  # the observer may have missed the last sign of life
             continue
@@ -90,17 +92,16 @@ def _around(reports: list[tuple[float, dict[str, Any]]], begin: float, end: floa
     return [*known, {}] if first < 0 or last == len(reports) else known
 
 
-def _last_move(history: History, joint: topics.Topic, begin: float, end: float) -> float:
-    """Return the time of the last sample before a joint moved between two times; -∞ if it stood still.
+def _moves(history: History, joint: topics.Topic, begin: float, end: float) -> list[tuple[float, float]]:
+    """Return the times of the samples before and after each move of a joint between two times.
 
     A joint that was set by hand has not moved.
     """
     reports = _reports(history, joint)
     samples = itertools.pairwise(between(history.stream(joint), begin, end))
-    moves = (pair for pair in samples if pair[0].value != pair[1].value)
-    driven = (
-        one.sent
-        for one, two in moves
-        if not any(BY_HAND in report for report in _around(reports, two.sent, two.sent))
-    )
-    return max(driven, default=-math.inf)
+    return [
+        (one.sent, two.sent)
+        for one, two in samples
+        if one.value != two.value
+        and not any(BY_HAND in report for report in _around(reports, two.sent, two.sent))
+    ]

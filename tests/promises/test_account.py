@@ -97,6 +97,18 @@ def test_report_names_what_the_watchdog_concluded_late_and_a_stranger(
     assert controller.endswith("had come at 5.00 s, and a stranger sent others (injected)")
 
 
+def test_report_on_a_joint_that_moved_too_late_names_the_drive() -> None:
+    times = [(20.0, (0.0, "host")), (20.5, (0.1, "host"))]
+    moved = replace(
+        STILL_ON,
+        lives=[*LIVES, Life(DRIVE, 15, 0.0, 19.0), Life(DRIVE, 16, 20.0, None)],
+        streams={**STILL_ON.streams, "driven_time": histories.samples(times)},
+    )
+    *_, drive, _ = account(moved, "S6", Evidence(20.2, "a joint still moved 15.00 s after"))
+
+    assert drive == "drive (16), the successor since 20.00 s, was heard last at 20.00 s, again at 20.50 s"
+
+
 def test_report_on_another_promise_tells_what_was_said_last() -> None:
     evidence = Evidence(13.0, "operator_watchdog is silent for 4.00 s after SIGKILL")
     assert account(STILL_ON, "L1", evidence) == [

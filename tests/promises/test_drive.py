@@ -44,7 +44,7 @@ def test_s6_joint_that_moves_too_late(joint: str) -> None:
     found = CHECKERS["S6"](history(joint, [(12.0, 0.25), (13.0, 0.5), (13.25, 0.75)]))
 
     text = "a joint still moved 11.00 s after the operator's last sign of life"
-    assert (found.cases, found.evidence) == (1, [Evidence(12.5, text)])
+    assert (found.cases, found.evidence) == (1, [Evidence(13.25, text)])
 
 
 def test_s6_joint_that_was_away_may_have_moved_in_time() -> None:
@@ -88,7 +88,7 @@ def test_s6_operator_may_be_seen_in_an_overload(end: float, expected: tuple[int,
 def test_s6_judges_every_silence() -> None:
     late = [(12.0, 0.25), (13.0, 0.5), (13.25, 0.75), (41.0, 1.0), (42.0, 1.5), (42.25, 2.0)]
     long = replace(history("theta1", late), end=60.0)
-    assert [each.time for each in CHECKERS["S6"](long).evidence] == [12.5, 41.5]
+    assert [each.time for each in CHECKERS["S6"](long).evidence] == [13.25, 42.25]
     assert CHECKERS["S6"](long).cases == 2
 
     blind = [Condition(OVERLOAD, at, at + 2.5) for at in (1.5, 30.5)]
