@@ -58,10 +58,13 @@ def account(history: History, promise: str, evidence: Evidence) -> list[str]:
         ]
         return [*lines, *_faults(history, since - BEFORE / 2, evidence.time)]
     program = _subject(history, evidence.text)
+    until = evidence.time
+    if promise == "L2":  # a silence begins at its time
+        until = next((each.sent for each in history.output(program) if each.sent > until), history.end)
     last = _values if program == KINEMATICS else _engines
     lines = [*_heard(history, program, evidence.time), *last(history, evidence.time)]
     lines += _ended(history, [program], evidence.time - BEFORE, evidence.time)
-    return [*lines, *_faults(history, evidence.time - BEFORE, evidence.time)]
+    return [*lines, *_faults(history, evidence.time - BEFORE, until)]
 
 
 def _subject(history: History, text: str) -> str:

@@ -72,7 +72,9 @@ def planned(history: History) -> dict[str, int]:
             each.target != CONTROLLER and runs(each.begin) and _is_held(silences, each.begin)
             for each in kills
         ),
-        "S3": sum(two.begin - one.end > HELD for one, two in pairwise(silences) if one in long),
+        "S3": sum(
+            min(two.begin, history.end) - one.end > HELD for one, two in pairwise(silences) if one in long
+        ),
         "S5": sum(each.pid > 0 for each in kills),
         "S6": stops if history.stream(topics.DRIVEN_TIME) else 0,
         "L2": FLOWING * len(kills),

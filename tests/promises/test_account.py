@@ -136,6 +136,18 @@ def test_report_tells_of_the_program_that_a_violation_is_about(text: str, progra
     assert account(History(40.0), "L3", Evidence(13.0, text))[0].startswith(f"{program} was heard")
 
 
+def test_report_on_a_silence_names_what_was_injected_in_it() -> None:
+    kills = [InjectedFault("kill", DRIVE, at, at, 9) for at in (15.3, 19.5)]
+    silent = replace(
+        STILL_ON,
+        faults=kills,
+        streams={**STILL_ON.streams, "operator_presence": histories.samples([(15.0, 0.0), (18.0, 0.0)])},
+    )
+    *_, injected = account(silent, "L2", Evidence(15.0, "operator_watchdog is silent for 3.00 s"))
+
+    assert injected == "injected: kill of drive at 15.30 s"
+
+
 def test_report_counts_the_strikes_before_a_return() -> None:
     activity = [(1.0, MISSED), (2.0, INCAPACITATED), (4.0, MISSED), (5.0, ALIVE), (8.0, MISSED)]
     seen = {"operator_activity": histories.samples(activity)}

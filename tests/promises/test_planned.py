@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from interfaces.topics import OFF, ON
@@ -17,6 +19,8 @@ DAY = 50.0
 AWAKE = 30.0
 """In each day of 50 s, the operator holds the switch for 30 s."""
 SILENCES = [Condition("silence", DAY * n + AWAKE, DAY * (n + 1)) for n in range(round(END / DAY))]
+
+NO_FAULTS = dict.fromkeys(("S2", "S5", "S6", "L2", "L3"), 0)
 
 
 def days(*, lets_go: bool, faults: list[InjectedFault] | None = None, driven: bool = False) -> History:
@@ -71,6 +75,10 @@ def test_half_of_at_least_four_planned_cases_is_enough(
 ) -> None:
     finding = with_planned(Finding("S2", cases, "", [], unknown), due, END)
     assert bool(finding.evidence) == fails
+
+
+def test_plan_of_a_run_that_was_shortened_ends_with_it() -> None:
+    assert planned(replace(days(lets_go=True), end=130.0)) == {**NO_FAULTS, "S1": 2, "S3": 2}
 
 
 def test_plan_counts_faults_and_releases() -> None:
