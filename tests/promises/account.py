@@ -127,7 +127,10 @@ def _controller(history: History, since: float, due: float) -> Iterator[str]:
         return
     last = ons[-1].sent
     presence = last_sent(history.stream(topics.OPERATOR_PRESENCE), min(last, due))
-    seen = f"the last presence had come at {presence.sent:.2f} s" if presence else "no presence had come"
+    seen = "no presence had come"
+    if presence:
+        ends = presence.sent + history.reaction.controller.presence_timeout
+        seen = f"the last presence had come at {presence.sent:.2f} s and counts until {ends:.2f} s at most"
     seen = f"until {due:.2f} s, {seen}"
     stop = f"the drive stops {1000 * DRIVE_TIMEOUT:.0f} ms later"
     injected = {each.kind for each in history.faults if each.begin <= last < each.end}
