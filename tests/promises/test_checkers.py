@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -434,6 +435,20 @@ def test_l1_constant_of_successors_that_come_soon_is_not_silent_for_good() -> No
     slow = InjectedFault("slow", "config_l1", 20.0, 21.0, 100)
     history = replace(good(), streams={**good().streams, "l1": told}, faults=[slow])
     assert not CHECKERS["L1"](history).evidence
+
+
+def test_l1_value_that_seldom_changes_is_not_silent_for_good() -> None:
+    told = [Sample(at, at, at) for at in (1.0, 6.0, 11.0, 16.0)]
+    slow = InjectedFault("slow", "config_l1", 20.0, 21.0, 100)
+    history = replace(good(), streams={**good().streams, "l1": told}, faults=[slow])
+    assert not CHECKERS["L1"](history).evidence
+
+
+def test_l2_gap_of_a_stream_that_is_often_interrupted_is_not_usual() -> None:
+    times = itertools.takewhile(lambda at: at < END, itertools.accumulate(itertools.cycle((0.1, 0.3, 0.3))))
+    states = [Sample(at, at, ON) for at in times]
+    history = replace(good(), streams={**good().streams, "engines/state": states})
+    assert not CHECKERS["L2"](history).evidence
 
 
 LATE = 0.002  # s
