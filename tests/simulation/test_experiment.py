@@ -83,7 +83,7 @@ def test_a_quiet_experiment_has_output_from_every_program() -> None:
         assert outcome.history.output(program), program
 
 
-def test_equal_experiments_give_equal_records_in_any_interpreter_by_one_worker_or_two() -> None:
+def test_record_is_the_same_in_each_interpreter_and_worker() -> None:
     program = (
         "import os; from tests.simulation import plan; from tests.simulation.workers import summaries; "
         "os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:{number}]); "

@@ -167,7 +167,7 @@ def test_each_thread_has_its_own_identity(simulation: Simulation) -> None:
 
 
 def test_a_real_thread_keeps_its_identity_and_its_time(simulation: Simulation) -> None:
-    """It is in no simulated process, whichever runs at that moment."""
+    """It belongs to no simulated process."""
     asked, answered = _thread.allocate_lock(), _thread.allocate_lock()
     asked.acquire()
     answered.acquire()
