@@ -124,7 +124,8 @@ class EventsExecutor:
     def _spin(self, timeout: float | None, once: bool) -> None:
         if self._spins:
             raise RuntimeError("Attempt to spin an already-spinning Executor")
-        limit = INFINITY if timeout is None else time.monotonic_ns() + math.ceil(timeout * 1e9)
+        now = time.monotonic_ns()
+        limit = INFINITY if timeout is None else now + math.ceil(timeout * 1e9)
         self._spins = True
         ready, wait = self._ready, self._wait_set.wait
         try:
@@ -132,7 +133,7 @@ class EventsExecutor:
                 if self._changed:
                     self._update()
                 if not ready:
-                    left = self._time_left(time.monotonic_ns(), limit)
+                    left = self._time_left(now, limit)
                     tokens = wait(min(left, _BETWEEN_LOOKS) if self._unfinished else left)
                     if not self._handle.is_valid:
                         self._nodes.clear()
@@ -149,13 +150,15 @@ class EventsExecutor:
                     ready.extend(self._unfinished)
                     self._unfinished.clear()
                     if not ready:
-                        if limit != INFINITY and time.monotonic_ns() >= limit and not self._changed:
+                        now = time.monotonic_ns()
+                        if now >= limit and not self._changed:
                             break
                         continue
                 handle, entity = ready.popleft()
                 handle(entity)
                 if once:
                     break
+                now = time.monotonic_ns()
         finally:
             self._spins = self._stopped = False
         if not self._handle.is_valid:
