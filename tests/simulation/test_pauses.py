@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 import rclpy
+import reactivex as rx
 from geometry_msgs.msg import Twist, Vector3
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -18,7 +19,7 @@ from std_msgs.msg import Header, String
 
 from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, ON, TURN_ON
-from reactive_node import stamps
+from reactive_node import ReactiveNode, stamps
 from services.drive import LONGEST_STEP
 from services.examples.twist_gate import COMMANDS
 from tests.simulation.machine import simulated_services
@@ -28,6 +29,8 @@ STEPS, TIMES = 40, 3
 ROUNDS = STEPS * TIMES
 MESSAGES, REST = 15, 4.0  # of a round; s of silence after them
 RATE = 25.0  # Hz of the drive
+PERIOD = 3.0  # s
+TICKS = replace(topics.ENGINES, name="ticks")
 
 
 @pytest.fixture
@@ -55,7 +58,7 @@ class Pauses:
         if writer.topic == self._topics[1]:
             message = deserialize_message(sample.data, self._topic.type)
             self.sent.append((now, self._topic.value(message)))
-        elif writer.topic == self._topics[0]:
+        if writer.topic == self._topics[0]:
             self._heard += 1
             if self._heard % MESSAGES == 0:
                 self.ends.append(now)
@@ -104,6 +107,13 @@ def steer() -> None:
             time.sleep(0.05)
             if message < MESSAGES:
                 states.publish(String(data=ON))
+
+
+def tick() -> None:
+    rclpy.init()
+    node = ReactiveNode("clock")
+    node.publish_observable(rx.interval(PERIOD).map(lambda _: String()), String, TICKS.name)
+    rclpy.spin(node)
 
 
 def publisher_of(node: Node, topic: topics.Topic) -> Any:
@@ -155,3 +165,13 @@ def test_gate_that_pauses_lets_no_command_pass_afterwards(simulation: Simulation
     assert any(velocity.linear.x for _, velocity in pauses.sent)
     for end in pauses.ends:  # one command may wait with its permission
         assert not any(velocity.linear.x for _, velocity in pauses.after(end, pause + 0.05))
+
+
+def test_timer_of_a_node_that_pauses_is_not_late_afterwards(simulation: Simulation) -> None:
+    clock = simulation.start(tick, name="clock")
+    pauses = Pauses(simulation, clock, TICKS, TICKS, PERIOD - 1.0)
+    simulation.run_until(lambda: len(pauses.ends) > STEPS, ROUNDS * MESSAGES * PERIOD)
+
+    assert len(pauses.ends) > STEPS
+    times = [at - pauses.sent[0][0] for at, _ in pauses.sent]
+    assert times == pytest.approx([n * PERIOD for n in range(len(times))], abs=0.001)

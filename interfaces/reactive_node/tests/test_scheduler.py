@@ -379,6 +379,12 @@ def test_time_begins_with_the_time_of_day(node: ReactiveNode) -> None:
     assert abs(node.scheduler.now - datetime.now(UTC)) < timedelta(seconds=1)
 
 
+def test_time_of_stamps_follows_simulated_time(simulation: Simulation) -> None:
+    for seconds in (1000, 10):
+        simulation.set(seconds)
+        assert simulation.node.scheduler.time_of_stamps() == seconds * 10**9
+
+
 def test_actions_get_their_state(node: ReactiveNode, spin_until: SpinUntil) -> None:
     states: list[Any] = []
     for schedule in (

@@ -28,6 +28,7 @@ _TState = TypeVar("_TState")
 _CATCH_UP = 50_000_000  # [ns]: a periodic action that is less late keeps its rate
 _NOT_HEARD = Time(clock_type=ClockType.ROS_TIME)  # simulated time before the first message on /clock
 _LONGEST_SLEEP = 86_400 * 10**9  # [ns]: ROS adds it to the time of day, in 64 bits
+_LATE = 1_000_000  # [ns] that the process may stand still while it sets the timer
 _FEW = 64  # cancelled items in the heap that are not worth a clean-up
 
 
@@ -80,8 +81,7 @@ class NodeScheduler(PeriodicScheduler):
         self._note_source()
         self._use_clock(self._time_is_simulated())
         if not self._simulated:
-            begin = time.time_ns() if steady else node.get_clock().now().nanoseconds
-            self._offset = begin - self._read()
+            self._offset = time.time_ns() - self._read()
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)),
             pre_callback=self._time_will_jump,
@@ -101,7 +101,7 @@ class NodeScheduler(PeriodicScheduler):
 
     def time_of_stamps(self) -> int:
         """Return the ROS time, by which the stamps of headers count [ns]; it may be set."""
-        if self._is_time_of_day:
+        if not self.is_simulated:
             return time.time_ns()  # rclpy's clock takes six calls
         return int(self._node.get_clock().now().nanoseconds)
 
@@ -224,16 +224,18 @@ class NodeScheduler(PeriodicScheduler):
         if self._armed_for is not None and self._armed_for <= due:
             return  # at worst it fires early and is armed again
         self._armed_for = due
-        self._timer.timer_period_ns = min(max(0, due - self._read()), _LONGEST_SLEEP)
-        self._timer.reset()  # wakes a waiting executor
+        while True:
+            now = self._read()
+            self._timer.timer_period_ns = min(max(0, due - now), _LONGEST_SLEEP)
+            self._timer.reset()  # wakes a waiting executor
+            if self._read() - now < _LATE:  # else the period begins too late
+                break
 
     # The clock
 
     def _note_source(self) -> None:
         clock = self._node.get_clock()
-        is_ros_time = isinstance(clock, ROSClock)
-        self.is_simulated = is_ros_time and bool(clock.ros_time_is_active)
-        self._is_time_of_day = is_ros_time and not self.is_simulated
+        self.is_simulated = isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
 
     def _use_clock(self, simulated: bool) -> None:
         self._simulated = simulated
