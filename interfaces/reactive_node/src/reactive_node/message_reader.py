@@ -72,7 +72,6 @@ class MessageReader(SharedReader):
         self._qos = qos_profile
         self._timestamped = timestamped
         self._reads_every_publisher = every_publisher and self._retained is not None
-        self._pairs = Pairs()
         # rclpy collects the info of a message only for a callback that takes it.
         self._callback: Callable[..., None] = self._receive_with_info if timestamped else self._receive
 

@@ -219,9 +219,9 @@ class _Interpolated(_Held):
 
     def take(self, time: int, value: Any) -> None:
         self._drop_late()
-        shifted, is_first = self._shifted or (None, False)
-        if shifted is not None and time <= shifted + self._gap:
-            self.take_late(Refused(time, value, "it comes right after a late one", is_first=is_first))
+        shifted = self._shifted
+        if shifted is not None and time <= shifted[0] + self._gap:
+            self.take_late(Refused(time, value, "it comes right after a late one", is_first=shifted[1]))
         else:
             super().take(time, value)
 
