@@ -39,11 +39,12 @@ def _used() -> tuple[int, int, int]:
 
 
 def assert_nothing_is_left(
-    action: Callable[[], object], rest: Callable[[], object], times: int = TIMES
+    action: Callable[[], object], rest: Callable[[], object], times: int = TIMES, limit: float = OCTETS
 ) -> None:
     """Call an action again and again: it leaves less than half an object behind each time.
 
     :param rest: returns when all is done that the last time has begun.
+    :param limit: of the octets that are left each time.
     """
     used = []
     for _ in range(2 + ROUNDS):
@@ -53,6 +54,6 @@ def assert_nothing_is_left(
         used.append(_used())
     rounds = [[b - a for a, b in zip(*pair, strict=True)] for pair in itertools.pairwise(used)]
     octets, blocks, open_ones = map(min, zip(*rounds[1:], strict=True))  # the first ones fill caches
-    assert octets / times < OCTETS, f"{octets / times:.1f} octets are left each time"
+    assert octets / times < limit, f"{octets / times:.1f} octets are left each time: {rounds}"
     assert blocks / times < BLOCKS, f"{blocks / times:.2f} blocks are left each time"
     assert open_ones <= 0, f"{open_ones} files and threads are left of {times} times"

@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+import reactivex as rx
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -13,6 +14,7 @@ from std_srvs.srv import SetBool
 
 from interfaces.reactive_node.tests.fibonacci import Fibonacci
 from reactive_node import ReactiveNode
+from reactive_node.end import End
 
 Create = Callable[[ReactiveNode], Observable[object]]
 OBSERVABLES: dict[str, Create] = {
@@ -94,6 +96,23 @@ def test_observable_of_ended_node_completes_at_once(node: ReactiveNode, create: 
     assert Watch(observable).ended == ["completed"]
 
 
+def test_source_is_observed_until_the_end_and_never_after() -> None:
+    end, source, heard = End(), Subject[int](), list[object]()
+
+    def begin(_: object) -> Observable[int]:
+        heard.append("begin")
+        return source
+
+    limited = end.limit(rx.defer(begin))
+    limited.subscribe(heard.append)
+    source.on_next(1)
+    end.come()
+    limited.subscribe(heard.append)
+
+    assert heard == ["begin", 1]
+    assert not source.observers
+
+
 def test_node_ends_without_an_error_although_a_signal_ends_its_context(
     node: ReactiveNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +126,34 @@ def test_node_ends_without_an_error_although_a_signal_ends_its_context(
     watch = Watch(node.create_observable(String, "topic"))
     node.destroy_node()
     assert watch.ended == ["completed"]
+
+
+def test_readers_have_a_tenth_of_a_second_together_for_the_last_messages(
+    node: ReactiveNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("first", "second", "third"):
+        node.publish_observable(Subject[String](), String, name)
+    now, waited = 10.0, list[float]()
+
+    def wait(_: Publisher, timeout: Duration) -> None:
+        nonlocal now
+        now += 0.06
+        waited.append(timeout.nanoseconds / 1e9)
+
+    monkeypatch.setattr("reactive_node.node.time.monotonic", lambda: now)
+    monkeypatch.setattr(Publisher, "wait_for_all_acked", wait)
+    node.destroy_node()
+
+    assert waited[:3] == pytest.approx([0.1, 0.04, 0.0])
+
+
+@pytest.mark.parametrize("name", ["scheduler", "steady_scheduler"])
+def test_nothing_stays_scheduled_after_the_end_of_the_node(node: ReactiveNode, name: str) -> None:
+    scheduler = getattr(node, name)
+    scheduler.schedule_relative(60.0, lambda *_: None)
+    assert scheduler.kept == 1
+    node.destroy_node()
+    assert scheduler.kept == 0
 
 
 def test_recipe_that_begins_at_the_end_of_the_node_ends_too(node: ReactiveNode) -> None:

@@ -46,6 +46,12 @@ def test_lost_liveliness_is_event(node: ReactiveNode, peer: Node, spin_until: Sp
     spin_until(lambda: alive[-1:] == [0])
 
 
+def test_reader_of_events_deserializes_no_message(node: ReactiveNode) -> None:
+    node.create_event_observable(String, "topic", 10, "matched").subscribe()
+    (reader,) = (each for each in node.subscriptions if each.topic_name == "/topic")
+    assert reader.raw
+
+
 def test_subject_makes_observable_of_publisher_events(
     node: ReactiveNode, peer: Node, spin_until: SpinUntil
 ) -> None:

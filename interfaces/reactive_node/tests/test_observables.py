@@ -120,6 +120,33 @@ def test_late_observer_of_latched_topic_gets_retained_samples(
     assert first == ["1", "2", "3", "4", "5"]
 
 
+def test_node_forgets_a_reader_that_has_gone(node: ReactiveNode) -> None:
+    known = node.default_callback_group.entities
+    before = len(known)
+    observed = node.create_observable(String, "topic").subscribe()
+    assert len(known) > before
+    observed.dispose()
+    gc.collect()
+    assert len(known) == before
+
+
+def test_volatile_publishers_of_a_latched_topic_are_read_only_if_wanted(
+    node: ReactiveNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    create = node.create_subscription
+    notices: list[bool] = []
+
+    def create_subscription(*arguments: Any, **options: Any) -> Any:
+        notices.append("event_callbacks" in options)
+        return create(*arguments, **options)
+
+    monkeypatch.setattr(node, "create_subscription", create_subscription)
+    node.create_observable(String, "topic", LATCHED).subscribe()
+    node.create_observable(String, "topic", LATCHED, every_publisher=True).subscribe()
+
+    assert notices == [False, True]
+
+
 def test_retained_samples_end_with_their_publisher(
     node: ReactiveNode, peer: Node, latched_talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:

@@ -2,11 +2,13 @@ from __future__ import annotations
 
 import gc
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 import reactivex as rx
 from rclpy.node import Node
+from reactivex.abc import DisposableBase
 from reactivex.disposable import Disposable
 from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
@@ -74,8 +76,25 @@ def test_observable_on_demand_is_observed_while_there_are_subscribers(
     assert happened == ["observed", "disposed"]
 
 
-def test_service_is_forgotten_after_disposal(node: ReactiveNode) -> None:
-    sink = node.serve_recipe(lambda requests: requests.ignore_elements(), SetBool, "switch")
+def test_publisher_ends_with_its_publication(node: ReactiveNode) -> None:
+    ended = node.publish_observable(rx.never(), Float64, "ended")
+    node.publish_observable(rx.never(), Float64, "lasting")
+    ended.dispose()
+    topics = {publisher.topic_name for publisher in node.publishers}
+    assert topics & {"/ended", "/lasting"} == {"/lasting"}
+
+
+SINKS: dict[str, Callable[[ReactiveNode], DisposableBase]] = {
+    "publication": lambda node: node.publish_observable(rx.never(), Float64, "numbers"),
+    "service": lambda node: node.serve_recipe(lambda requests: requests.ignore_elements(), SetBool, "switch"),
+}
+
+
+@pytest.mark.parametrize("create", SINKS.values(), ids=SINKS)
+def test_sink_is_forgotten_after_disposal(
+    node: ReactiveNode, create: Callable[[ReactiveNode], DisposableBase]
+) -> None:
+    sink = create(node)
     disposed = weakref.ref(sink)
 
     sink.dispose()

@@ -217,17 +217,19 @@ def test_other_thread_may_dispose_while_it_is_read(node: ReactiveNode, talker: T
 
 def test_refused_message_is_reported_and_the_next_one_read(ticks: Subject[None]) -> None:
     """Not every middleware refuses the same messages, so a reader of the test does."""
-    taken = mock.Mock(side_effect=[RuntimeError("no String"), (String(data="good"), {"source_timestamp": 0})])
+    good = String(data="good"), {"source_timestamp": 7}
+    taken = mock.Mock(side_effect=[RuntimeError("no String"), good, None])
     subscription = mock.MagicMock(topic_name="/text", handle=mock.MagicMock(take_message=taken))
     warnings: list[str] = []
     stub = mock.Mock()
     stub.get_logger.return_value.warning = warnings.append
     received: list[Any] = []
-    sampled_messages(stub, lambda **_: subscription, ticks).subscribe(received.append)
+    read = sampled_messages(stub, lambda **_: subscription, ticks, timestamped=True, most=5)
+    read.subscribe(received.append)
     ticks.on_next(NOW)
-    assert (received, warnings) == ([], ["/text: no String"])
-    ticks.on_next(NOW)
-    assert received == [String(data="good")]
+    assert warnings == ["/text: no String"]
+    assert [(it.value, it.nanoseconds) for it in received] == [(String(data="good"), 7)]
+    assert taken.mock_calls == 3 * [mock.call(subscription.msg_type, subscription.raw)]
 
 
 def test_reading_goes_on_after_a_malformed_message(

@@ -78,4 +78,4 @@ def test_ros_time_of_nanoseconds_is_exact() -> None:
 
 
 def test_header_that_nobody_has_filled_in_has_no_stamp() -> None:
-    assert stamps.by_header(PointStamped()).nanoseconds == stamps.UNSTAMPED
+    assert stamps.by_header(PointStamped()).nanoseconds == stamps.UNSTAMPED == -1
