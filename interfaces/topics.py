@@ -29,7 +29,7 @@ from reactive_node import stamps
 try:
     from tf2_msgs.msg import TFMessage
 except ModuleNotFoundError:  # ROS 2's wheels on PyPI do not have it
-    TFMessage = None
+    TFMessage = "tf2_msgs/msg/TFMessage"
 
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
@@ -156,6 +156,7 @@ class Topic:
 
     name: str
     type: Any
+    """The class of its messages; its name where that is not installed."""
     qos: QoSProfile
     unit: str
     publishers: tuple[str, ...]
@@ -192,6 +193,8 @@ class Topic:
     @property
     def type_name(self) -> str:
         """The type as ROS 2 names it, for example ``std_msgs/msg/Float64``."""
+        if isinstance(self.type, str):
+            return self.type
         package, kind = self.type.__module__.split(".")[:2]
         return f"{package}/{kind}/{self.type.__name__}"
 
@@ -201,12 +204,12 @@ class Topic:
 
 
 def _not_usable(*numbers: float) -> str:
-    if all(abs(number) <= LARGEST for number in numbers):  # this refuses NaN
-        return ""
-    shown = numbers if len(numbers) > 1 else numbers[0]
-    if all(map(math.isfinite, numbers)):
-        return f"{shown} is not from {-LARGEST:g} to {LARGEST:g}"
-    return f"{shown} is not finite"
+    for number in numbers:  # a generator would cost a call for each
+        if not abs(number) <= LARGEST:  # nor is NaN
+            shown = numbers if len(numbers) > 1 else number
+            is_finite = all(map(math.isfinite, numbers))
+            return f"{shown} is not {f'from {-LARGEST:g} to {LARGEST:g}' if is_finite else 'finite'}"
+    return ""
 
 
 def _not_a_length(value: float) -> str:
@@ -454,7 +457,7 @@ DIAGNOSTICS = Topic(
 
 ROWS = tuple(each for each in [*globals().values()] if isinstance(each, Topic))
 """All topics above."""
-CONTRACT = tuple(topic for topic in ROWS if topic.type)
+CONTRACT = tuple(topic for topic in ROWS if not isinstance(topic.type, str))
 """Those whose type is installed."""
 PARAMETER_CLIENTS = {
     "terminal": (EVERY_SERVICE,),
@@ -488,7 +491,7 @@ def markdown() -> str:
     """Return the contract as the table that the README shows."""
     head = "| topic | type | QoS | unit | published by | read by | meaning |"
     lines = [head, "|---|---|---|---|---|---|---|"]
-    for topic in CONTRACT:
+    for topic in ROWS:
         row = (
             f"`{topic.name}`",
             topic.type_name.replace("/msg", ""),
@@ -508,7 +511,7 @@ def mermaid() -> str:
     What a node of the arm reads, the operator sees as well: those arrows are not drawn.
     """
     lines = ["flowchart LR"]
-    for topic in CONTRACT:
+    for topic in ROWS:
         if topic is not DIAGNOSTICS:
             readers = [node for node in topic.subscribers if node not in (*OPERATOR_NODES, FLEET)]
             ends = (" & ".join(topic.publishers), " & ".join(readers or topic.subscribers))

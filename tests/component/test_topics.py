@@ -6,13 +6,14 @@ from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, TimeReference
 from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
-from interfaces.topics import PlanarTwist, Position, Topic
+from interfaces.topics import PlanarTwist, Position, Sender, Topic
 
 BEYOND = "{} is not from -1e+09 to 1e+09"
 
@@ -47,6 +48,13 @@ BEYOND = "{} is not from -1e+09 to 1e+09"
         (topics.ENGINES_STATE, "turn_on", "'turn_on' is unknown"),
         *((topics.OPERATOR_ACTIVITY, data, "") for data in ("alive", "missed", "incapacitated")),
         (topics.OPERATOR_ACTIVITY, "asleep", "'asleep' is unknown"),
+        (topics.ENGINES_SENDER, Sender("turn_on", "a"), ""),
+        (topics.ENGINES_SENDER, Sender("turn_off", 255 * "a"), ""),
+        (topics.ENGINES_SENDER, Sender("on", "terminal"), "'on' is unknown"),
+        (topics.ENGINES_SENDER, Sender("turn_on", ""), "'' is no name of a node"),
+        (topics.ENGINES_SENDER, Sender("turn_on", 256 * "a"), f"'{40 * 'a'}' is no name of a node"),
+        (topics.ENGINES_CAUSE, DiagnosticArray(), "it has not one status"),
+        (topics.DIAGNOSTICS, DiagnosticArray(), ""),
         (topics.ROBOT_DESCRIPTION, "anything", ""),
     ],
 )
@@ -80,6 +88,17 @@ def test_problem_of_a_value(topic: Topic, value: Any, problem: str) -> None:
             Header(stamp=Time(sec=1, nanosec=5000)),
             datetime(1970, 1, 1, 0, 0, 1, 5, tzinfo=UTC),
         ),
+        (
+            topics.DRIVEN_TIME,
+            TimeReference(
+                header=Header(stamp=Time(sec=7, nanosec=8), frame_id="robot"),
+                time_ref=Time(sec=5, nanosec=500_000_000),
+                source="id",
+            ),
+            topics.DrivenTime(7_000_000_008, 5.5, "id", "robot"),
+        ),
+        (topics.ENGINES_SENDER, KeyValue(key="turn_on", value="terminal"), Sender("turn_on", "terminal")),
+        (topics.OPERATOR_HAND, Header(frame_id="terminal"), Header(frame_id="terminal")),
         (topics.JOINT_STATES, JointState(name=["theta1"]), JointState(name=["theta1"])),
     ],
     ids=lambda it: getattr(it, "name", ""),
@@ -102,6 +121,7 @@ def test_topics_that_report_single_events_may_be_silent() -> None:
     streams = ("l1", "theta2", "effector/position", "effector/speed", "joint_states", "engines/state")
     assert gaps == gaps | {
         **dict.fromkeys(("effector/twist", "robot_description", "operator_activity", "engines"), math.inf),
+        **dict.fromkeys(("operator_hand", "engines/sender", "engines/cause"), math.inf),
         **dict.fromkeys(("operator_presence", "/diagnostics"), 1.0),  # at 2 Hz, at 1 Hz
         **dict.fromkeys((*streams, "operator_heartbeat"), 0.25),
     }
@@ -118,7 +138,14 @@ def test_topics_follow_those_that_they_are_made_of() -> None:
     }
 
 
-def test_configuration_is_the_four_sources() -> None:
+def test_transforms_are_a_topic_even_where_their_type_is_missing() -> None:
+    tf = topics.TF
+    assert (tf.name, tf.qos.depth, tf.unit, tf.publishers) == ("/tf", 100, "m, rad", ("robot_state",))
+    assert tf.meaning.endswith("only where the package tf2_msgs is installed")
+
+
+def test_configuration_is_the_four_sources_and_a_drive_moves_the_angles() -> None:
+    assert topics.JOINTS == (topics.THETA1, topics.THETA2)
     assert list(topics.CONFIGURATION.items()) == [
         (topic.name, topic) for topic in (topics.L1, topics.L2, topics.THETA1, topics.THETA2)
     ]
