@@ -194,7 +194,7 @@ class HealthReporter:
         """Report to a new subscriber at once; called when a subscriber comes or goes."""
         # Without what comes before a report: a new process has its first output to make.
         if subscribers.current_count_change > 0:
-            self._remarks = defaultdict(_Remarks, {**self._of_last_second, **self._remarks})
+            self._remarks.update({**self._of_last_second, **self._remarks})
             with suppress(InvalidHandle):  # ROS 2's rclpy may call this after the node was destroyed
                 self.report()
 
@@ -240,7 +240,7 @@ class Health(NamedTuple):
     """Why the service is not ok."""
     since_output: float | None
     """Age of the service's last output [s]; ``None`` before the first."""
-    host: str = ""
+    host: str
     """The name of its host."""
 
 

@@ -109,10 +109,13 @@ class ServiceNode(ReactiveNode):
         self, topic: Topic, ticks: float | Observable[Any], on_full: Callable[[], Any] = lambda: None
     ) -> Observable[Any]:
         """Return all good values at each tick: see :meth:`ReactiveNode.create_buffered_observable`."""
-        options = self._reading(topic, False, None) | {"on_full": on_full}
-        return self.create_buffered_observable(topic.type, topic.name, ticks, topic.qos, **options)
+        return self.create_buffered_observable(
+            topic.type, topic.name, ticks, topic.qos, on_full=on_full, **self._reading(topic)
+        )
 
-    def _reading(self, topic: Topic, timestamped: bool, max_age: float | None) -> dict[str, Any]:
+    def _reading(
+        self, topic: Topic, timestamped: bool = False, max_age: float | None = None
+    ) -> dict[str, Any]:
         """Return the options of an observable of the good values of a topic."""
         self.peers.reads(topic)
         staleness = None if max_age is None else partial(self._staleness, max_age)

@@ -46,7 +46,7 @@ class Declaration(NamedTuple):
 
     @property
     def type(self) -> Parameter.Type:
-        return self.default if isinstance(self.default, Parameter.Type) else _type_of(self.default)
+        return _type_by_default(self.default)
 
     def problem(self, value: object) -> str:
         """Return why the parameter cannot have this value; empty if it can."""
@@ -66,8 +66,8 @@ def parameter(
 
     :raises TypeError: if no parameter file can hold a value of that type, for example of an empty list.
     """
-    declaration = Declaration("", default, within, unit, meaning, settable)
-    if declaration.type not in _TYPES or (within and declaration.type not in _WITH_RANGE):
+    found = _type_by_default(default)
+    if found not in _TYPES or (within and found not in _WITH_RANGE):
         raise TypeError(
             f"{default!r} cannot be the default of a parameter{' with a range' if within else ''}"
         )
@@ -78,10 +78,15 @@ def parameter(
     return field
 
 
+def _type_by_default(default: object) -> Parameter.Type:
+    """Return the type of a parameter by its default; see :class:`Declaration`."""
+    return default if isinstance(default, Parameter.Type) else _type_of(default)
+
+
 def _type_of(value: object) -> Parameter.Type:
-    """Return the type of a value; NOT_SET if no parameter file can show it, for example of an empty list."""
+    """Return the type of a value; none of `_TYPES` if no parameter file can show it, as of an empty list."""
     try:
-        found: Parameter.Type = Parameter.Type.from_parameter_value(None if value in ((), []) else value)
+        found: Parameter.Type = Parameter.Type.from_parameter_value(value)
     except TypeError:
         return Parameter.Type.NOT_SET
     return found

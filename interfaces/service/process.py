@@ -60,7 +60,7 @@ def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
     try:
         chosen = _enclave(name)
         with middleware.without_shared_memory():
-            arguments = [*sys.argv[:1], *middleware.WITHOUT_LOG_FILES, *sys.argv[1:], *chosen]
+            arguments = [*middleware.WITHOUT_LOG_FILES, *sys.argv, *chosen]
             # rclpy's handlers would shut DDS down at once, before a last value is published.
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
