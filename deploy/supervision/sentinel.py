@@ -125,12 +125,18 @@ def carry_out(action: Action, run: Path, supervisord: Supervisord) -> None:
 
 @dataclass(frozen=True)
 class Parameters:
-    period: float = parameter(0.5, (0.05, 0.5), "s", "period at which the processes are observed")
+    period: float = parameter(Timeouts.period, (0.05, 0.5), "s", "period at which the processes are observed")
     health_timeout: float = parameter(
-        2.7, (2.7, 3.3), "s", "a service whose loop shows no sign of life for this long is killed"
+        Timeouts.health,
+        (2.7, 3.3),
+        "s",
+        "a service whose loop shows no sign of life for this long is killed",
     )
     start_timeout: float = parameter(
-        10.0, (5.0, 300.0), "s", "time of a new process until its first sign of life, and of a mute one"
+        Timeouts.start,
+        (5.0, 300.0),
+        "s",
+        "time of a new process until its first sign of life, and of a mute one",
     )
 
 

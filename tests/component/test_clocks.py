@@ -10,13 +10,15 @@ from functools import partial
 from typing import Any
 
 import pytest
+import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from reactivex import Observable
 
 from deploy.supervision import manifest
 from interfaces.service import ServiceNode, clocks
-from interfaces.service.clocks import MOST_HOSTS, Clocks
-from interfaces.topics import DIAGNOSTICS
-from reactive_node.testing import MakeNode, SpinUntil
+from interfaces.service.clocks import MOST_HOSTS, MOST_REPORTS, Clocks
+from interfaces.topics import DIAGNOSTICS, Topic
+from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
 from services import drive, engine_controller, operator_watchdog
 from tests import health_reports
 
@@ -62,6 +64,17 @@ def test_hosts_that_have_gone_make_room_for_others(monkeypatch: pytest.MonkeyPat
     for _ in range(3):
         found.hear(report(9.0))
     assert found.wrong().keys() == {"desk"}
+
+
+def test_only_the_first_hosts_and_the_last_reports_count() -> None:
+    hosts = [f"host{number}" for number in range(MOST_HOSTS + 1)]
+    assert heard(*(report(9.0, host) for host in hosts for _ in range(3))).wrong().keys() == {*hosts[:-1]}
+    found = heard(report(0.0), *(report(9.0) for _ in range(MOST_REPORTS)))
+    assert found.differences() == {"desk": pytest.approx(9.0, abs=0.5)}
+
+
+def test_nothing_is_refused_where_no_host_is_awaited() -> None:
+    assert heard().refusal() == ""
 
 
 @pytest.mark.parametrize(
@@ -143,6 +156,27 @@ def test_engines_wait_for_the_first_comparison_of_the_clocks(
     assert refusals == ["the clocks of the hosts are not compared yet"]
     spin_until(lambda: refusals[1:] == [""])  # no other host runs
     assert time.monotonic() - begin >= 3.0
+
+
+class Lonely:
+    """A node of a host that hears no other one."""
+
+    def get_namespace(self) -> str:
+        return "/"
+
+    def observe(self, topic: Topic) -> Observable[Any]:
+        return rx.never()
+
+
+def test_wait_for_a_host_that_does_not_run_is_three_seconds_long(
+    scheduler: VirtualTime, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(manifest.HOST, "robot")
+    monkeypatch.setattr(clocks.time, "monotonic", lambda: scheduler.clock)
+    node: Any = Lonely()
+    (begin, first), (end, second) = scheduler.record(clocks.observe(node), until=5.0).items
+    assert (first, second) == ("the clocks of the hosts are not compared yet", "")
+    assert (begin, end) == (0.0, pytest.approx(3.0, abs=0.11))
 
 
 @pytest.mark.parametrize(

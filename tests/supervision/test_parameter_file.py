@@ -137,10 +137,10 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(load: Load) -> None:
             " (dead_mans_switch.rate), 0.05 s each: one lost heartbeat is no strike",
         ),
         (
-            "{dead_mans_switch: {ros__parameters: {rate: 1.0}}, "
-            "operator_watchdog: {ros__parameters: {silence: 2.4}}}",
-            "silence must be at least 2.5 s, not 2.4: sampling and two periods of the switch"
-            " (dead_mans_switch.rate), 1 s each: one lost heartbeat is no strike",
+            "{dead_mans_switch: {ros__parameters: {rate: 3.0}}, "
+            "operator_watchdog: {ros__parameters: {silence: 1.1}}}",
+            "silence must be at least 1.167 s, not 1.1: sampling and two periods of the switch"
+            " (dead_mans_switch.rate), 0.333333 s each: one lost heartbeat is no strike",
         ),
         (
             "operator_watchdog: {ros__parameters: {silence: 1.0004, strikes: 1}}",
@@ -158,8 +158,9 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(load: Load) -> None:
             "an operator who is present is reported only so often (sampling, dead_mans_switch.rate)",
         ),
         (
-            "dead_mans_switch: {ros__parameters: {rate: 2.5}}",
-            "max_presence_age must be at least 1.05 s, not 1: "
+            "{dead_mans_switch: {ros__parameters: {rate: 3.0}}, "
+            "engine_controller: {ros__parameters: {max_presence_age: 0.98}}}",
+            "max_presence_age must be at least 0.983 s, not 0.98: "
             "an operator who is present is reported only so often (sampling, dead_mans_switch.rate)",
         ),
         (

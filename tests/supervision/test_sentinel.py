@@ -49,7 +49,8 @@ def test_state_of_a_process(given: Program, recent: int, level: bytes, message: 
     [("RUNNING", "", ""), ("RUNNING", "hung", "hung"), ("FATAL", "", FATAL.error), ("FATAL", "hung", "hung")],
 )
 def test_publishes_state_pid_restarts_exit_and_reason(state: str, reason: str, why: str) -> None:
-    (status,) = states([FATAL._replace(state=state, pid=501)], {"velocity": reason}, {}, "/sentinel")
+    reasons = {"velocity": reason} if reason else {}
+    (status,) = states([FATAL._replace(state=state, pid=501)], reasons, {}, "/sentinel")
     assert {pair.key: pair.value for pair in status.values} == {
         "process": "velocity",
         "state": state,

@@ -219,8 +219,11 @@ def test_program_that_another_host_runs_as_well_is_reported(
     wired: Any, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(manifest, "programs", lambda: (manifest.Program("service", "services.drive", ()),))
-    monkeypatch.setattr(sentinel, "is_here", lambda host: False)
     watching = wired()
+    watching.remarks()
+    spin_until(lambda: "service" in watching.probe.heard)
+    assert watching.remarks() == []
+    monkeypatch.setattr(sentinel, "is_here", lambda host: host != socket.gethostname())
     expected = f"service: it runs on host {socket.gethostname()} as well"
     spin_until(lambda: any(remark.startswith(expected) for remark in watching.remarks()))
 
