@@ -180,6 +180,7 @@ def test_late_reception_is_an_overload(
         (Life("velocity", 7, 7.9, None), 1),
         (Life("kinematics", 7, 9.0, None), 1),
         (InjectedFault("partition", "operator", 5.0, 9.0), 0),
+        (InjectedFault("partition", "operator", 10.4, 11.0), 0),  # it was under way
         (InjectedFault("partition", "operator", 10.6, 11.0), 1),
         (InjectedFault("bad_line", "operator", 5.0, 12.0), 0),
         (Condition("loss", 0.0, 30.0), 0),  # --loss

@@ -13,7 +13,7 @@ HERE = socket.gethostname()
 
 
 def health(pid: int, *, since_output: float | None = 0.0, reason: str = "") -> Health:
-    return Health(time.monotonic(), pid, ok=not reason, reason=reason, since_output=since_output)
+    return Health(time.monotonic(), pid, not reason, reason, since_output, HERE)
 
 
 def test_the_table_shows_each_service(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -136,6 +136,13 @@ def test_turn_off_by_a_person_ends_the_repetition_of_the_scenario(play: Play, sp
     assert commands_of(switch) == [TURN_ON, TURN_OFF]
 
 
+def test_scenario_presses_the_switch(connect: Connect, spin_until: SpinUntil, tmp_path: Path) -> None:
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("operator: {pressed: [{from: 0.0}]}\n")
+    switch = connect(wire, outputs=[OPERATOR_HEARTBEAT], scenario=str(scenario), scenario_epoch=0.0)
+    spin_until(lambda: switch.heard[OPERATOR_HEARTBEAT.name])
+
+
 def test_restart_without_its_settings_presses_nothing(
     connect: Connect, spin_for: SpinFor, tmp_path: Path
 ) -> None:

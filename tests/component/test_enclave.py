@@ -87,3 +87,12 @@ def test_each_report_warns_of_the_end_of_its_keys(make_node: MakeNode, spin_unti
         velocity = socket.gethostname(), "velocity"
         spin_until(lambda: velocity in health)  # the first report, too
         assert health[velocity].reason == f"keys: they end in 3 days, and the arm with them: {RENEW}"
+
+
+def test_service_ends_with_its_keys(make_node: MakeNode) -> None:
+    service, now, hour = make_node("velocity", kind=ServiceNode), datetime.now(UTC), timedelta(hours=1)
+    service.health.keys = Keys("/velocity", now - hour, now + hour)
+    service.health.on_period()
+    service.health.keys = Keys("/velocity", now - hour, now)
+    with pytest.raises(UserError, match=r"^the keys of /velocity have ended at "):
+        service.health.on_period()

@@ -150,7 +150,7 @@ def test_refused_turn_on_is_reported_until_one_is_obeyed(play: Play) -> None:
     ("given", "words"),
     [
         (Cause(OFF, STARTED), "not turned on since engine_controller started"),
-        (Cause(ON, TURN_ON, "terminal_7"), "turned on by terminal_7"),
+        (Cause(ON, TURN_ON, "terminal_7", since=3.25), "turned on by terminal_7"),
         (Cause(OFF, TURN_OFF, "operator_page"), "turned off by operator_page"),
         (Cause(OFF, TURN_OFF), "turned off by a node that gave no name"),
         (

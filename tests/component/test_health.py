@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import ClockType
 from rclpy.node import Node
@@ -20,7 +21,14 @@ from interfaces.limits import LARGEST_MESSAGE, bad_report
 from interfaces.reactive_node.tests.leftovers import assert_nothing_is_left
 from interfaces.service import ServiceNode
 from interfaces.service.beats import Beats
-from interfaces.service.health import cause, healths, heard_healths, reported_parameters
+from interfaces.service.health import (
+    cause,
+    healths,
+    heard_healths,
+    reported_movement,
+    reported_parameters,
+    reported_refusals,
+)
 from interfaces.topics import DIAGNOSTICS, ROWS
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from services import dead_mans_switch, operator_watchdog
@@ -39,6 +47,24 @@ def test_report_of_a_service_in_the_namespace_is_read() -> None:
     assert (health.pid, health.ok, health.reason, health.since_output) == (7, True, "running", 0.5)
     silent = healths(message("/velocity", GOOD | {"seconds_since_output": ""}), "")["velocity"]
     assert silent.since_output is None
+    older = healths(message("/velocity", {"pid": "7", "published": "3"}), "")["velocity"]
+    assert older.since_output is None
+
+
+def test_name_of_a_host_has_64_characters_at_most() -> None:
+    health = healths(message("/velocity", GOOD, "h" * 65), "")["velocity"]
+    assert health.host == "h" * 64
+
+
+def test_movement_of_a_service_is_read_from_its_report() -> None:
+    (status,) = message("/config_theta1", GOOD | {"fastest": "0.5", "by hand": "value"}).status
+    assert reported_movement(status) == {"fastest": 0.5, "by hand": "value"}
+
+
+def test_nested_parameter_is_an_error_of_the_report() -> None:
+    (status,) = message("/velocity", GOOD | {"parameter rate": "[" * 1_000_000}).status
+    with pytest.raises(ValueError, match=r"^a parameter is nested too deeply$"):
+        reported_parameters(status)
 
 
 @pytest.mark.parametrize(
@@ -238,6 +264,47 @@ def test_report_is_never_too_large_to_be_read(service: ServiceNode, published: l
     assert bad_report(published[0]) == ""
 
 
+def test_long_reasons_are_cut(service: ServiceNode, published: list[Any]) -> None:
+    service.remark("l1", "x" * 201)
+    service.health.report()
+    for topic in range(30):
+        service.remark(f"topic{topic}", "x" * 201)
+    service.health.report()
+    one, many = (each.status[0].message for each in published)
+    assert one == f"l1: {'x' * 200}"
+    assert len(many) == 4000
+
+
+def test_causes_that_look_the_same_are_one_reason(service: ServiceNode, published: list[Any]) -> None:
+    numbers = "1.23456 " * 30
+    for end in ("degrees", "volts"):
+        service.remark("drive", numbers + end)
+    service.health.report()
+    assert published[0].status[0].message == f"drive: {numbers[:200]} (2 times)"
+
+
+def test_refused_samples_are_counted_and_the_first_50_listed(
+    service: ServiceNode, published: list[Any]
+) -> None:
+    for moment in range(51):
+        service.health.refuse("l1", "it is late", moment, None)
+    service.health.refuse("l2", "it is early", 7, 9)
+    service.health.report()
+    (status,) = published[0].status
+    assert status.message == "l1: it is late (51 times); l2: it is early"
+    assert service.health.dropped == 51
+    assert reported_refusals(status, "l1") == [(moment, None) for moment in range(50)]
+    assert reported_refusals(status, "l2") == [(7, 9)]
+
+
+def test_what_is_usual_is_counted_since_the_start(service: ServiceNode, published: list[Any]) -> None:
+    for _ in range(3):
+        service.health.count("late heartbeats")
+        service.health.report()
+    counts = [pair.value for each in published for pair in each.status[0].values if "late" in pair.key]
+    assert counts == ["1", "2", "3"]
+
+
 def test_standing_warning_is_in_each_report(service: ServiceNode, published: list[Any]) -> None:
     service.health.standing = {"disk": "it is nearly full"}
     service.remark("l1", "late")
@@ -251,6 +318,17 @@ def test_standing_warning_is_in_each_report(service: ServiceNode, published: lis
         "disk: it is nearly full",
         "running",
     ]
+
+
+def test_report_has_facts_while_items_are_observed(service: ServiceNode, published: list[Any]) -> None:
+    stated = service.stating({"fastest": "0.5"}, rx.never())
+    service.health.report()
+    observed = stated.subscribe()
+    service.health.report()
+    observed.dispose()
+    service.health.report()
+    values = [{pair.key: pair.value for pair in array.status[0].values} for array in published]
+    assert [each.get("fastest") for each in values] == [None, "0.5", None]
 
 
 def test_report_has_host_uptime_and_age_of_the_last_output(
@@ -284,6 +362,7 @@ def test_report_has_the_parameters_that_are_not_the_default(
     service.health.report()
 
     (status,) = published[0].status
+    assert [pair.value for pair in status.values if pair.key == "parameter silence"] == ["1.5"]
     assert reported_parameters(status) == {"silence": 1.5}  # `rate` may change
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from deploy.commands import tables
 from deploy.supervision.processes import ROOT
-from interfaces import topics
 
 PAGES = (
     "README.md",
@@ -27,9 +26,7 @@ RECIPES = {
 
 
 def text_of(page: str) -> str:
-    """Return the text of a page; without `/tf`, where tf2_msgs is not installed."""
-    text = (ROOT / page).read_text(encoding="utf-8")
-    return text if topics.TF in topics.CONTRACT else re.sub(r".*(`/tf` \||-- /tf).*\n", "", text)
+    return (ROOT / page).read_text(encoding="utf-8")
 
 
 def programs_of(page: str) -> list[str]:

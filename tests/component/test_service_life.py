@@ -10,16 +10,21 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+import rclpy
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from deploy.supervision.processes import ROOT
-from interfaces.service import process
-from interfaces.service.middleware import PROFILES, RANGE
+from interfaces.service import instance, process
+from interfaces.service.middleware import PROFILES, RANGE, WITHOUT_LOG_FILES
 from interfaces.topics import L1
 from reactive_node.testing import MakeNode, SpinUntil
+from tests.users import NOBODY, fork, needs_root
 
 CYCLONE = get_rmw_implementation_identifier() == "rmw_cyclonedds_cpp"
 
@@ -79,7 +84,16 @@ from interfaces.service import enclave
 
 enclave.arguments = lambda name, namespace: ["--ros-args", "--enclave", enclave.path(name, namespace)]
 enclave.keys = lambda name: enclave.Keys(name, datetime(2026, 1, 1, tzinfo=UTC), datetime.now(UTC))
-service.run("keyed", lambda node: None)
+service.run("keyed", lambda node: print(node.health.keys, flush=True))
+"""
+
+LASTING_KEYS = """
+from datetime import UTC, datetime
+from interfaces.service import enclave
+
+begin, end = (datetime(year, 1, 1, tzinfo=UTC) for year in (2026, 9999))
+enclave.arguments = lambda name, namespace: ["--ros-args", "--enclave", enclave.path(name, namespace)]
+enclave.keys = lambda name: enclave.Keys(name, begin, end)
 """
 
 READY = """
@@ -89,6 +103,20 @@ def wire(node):
     node.create_timer(0.01, lambda: print("ready", flush=True))
 
 service.run("ready", wire)
+"""
+
+WAITING = """
+from interfaces import service
+from interfaces.service import health
+from reactive_node import executor
+
+health.PERIOD = 3600.0
+executor._experimental = None  # an older rclpy: its executor waits without an end
+
+def wire(node):
+    node.scheduler.schedule(lambda *_: print("ready", flush=True))
+
+service.run("waiting", wire)
 """
 
 PUBLISHING = """
@@ -203,6 +231,29 @@ def test_service_publishes_a_last_value_at_a_signal(
     assert heard == [7.0]
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_service_that_waits_for_nothing_ends_at_a_signal(start: Start, number: signal.Signals) -> None:
+    process = start("-c", NO_LAST_RESORT + WAITING)
+    assert process.wait_for_line() == "ready"
+
+    assert process.end(by=number) == (0, "")
+
+
+def test_who_was_woken_by_signals_before_still_is() -> None:
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    before = signal.set_wakeup_fd(writing)
+    executor: Any = SimpleNamespace(wake=lambda: None)
+    try:
+        process._wake_at_signals(executor)
+    finally:
+        woken = signal.set_wakeup_fd(before)
+        os.close(reading)
+        os.close(writing)
+
+    assert woken == writing
+
+
 def test_second_signal_ends_a_service_at_once(start: Start) -> None:
     process = start("-c", NO_LAST_RESORT + HANGING)
     assert process.wait_for_line() == "hangs"
@@ -247,6 +298,16 @@ def test_service_ends_with_its_keys(start: Start) -> None:
     )
 
 
+def test_keys_are_those_of_the_supervised_program(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUPERVISOR_PROCESS_NAME", "velocity")
+    assert "the keys of /velocity have ended" in start("-c", KEYED).end()[1]
+
+
+@pytest.mark.parametrize("option", ["-e", "--enclave"])
+def test_enclave_of_the_command_line_counts(start: Start, option: str) -> None:
+    assert start("-c", KEYED, "--ros-args", option, "/other").wait_for_line() == "None"
+
+
 def test_signal_after_the_end_does_not_change_the_exit_code(start: Start) -> None:
     assert start("-c", SIGNALLED_AT_EXIT + FAILING_WHILE_WIRED).end()[0] == 1
 
@@ -259,6 +320,36 @@ def test_second_instance_refuses_to_start_and_names_the_first(start: Start, doma
 
     assert code == 1
     assert errors == f"ready: /ready already runs in domain {domain_id}\n"
+
+
+@needs_root
+@pytest.mark.parametrize(
+    ("program", "supervised", "starts"),
+    [
+        (READY, False, False),
+        (READY, True, True),
+        (LASTING_KEYS + READY, False, True),
+        (LASTING_KEYS + READY, True, True),
+    ],
+)
+def test_only_a_service_that_is_started_by_hand_gives_way_to_another_user(
+    start: Start,
+    domain_id: int,
+    monkeypatch: pytest.MonkeyPatch,
+    program: str,
+    supervised: bool,
+    starts: bool,
+) -> None:
+    if supervised:
+        monkeypatch.setenv("SUPERVISOR_PROCESS_NAME", "ready")
+    context = SimpleNamespace(get_domain_id=lambda: domain_id)
+    theirs: Any = SimpleNamespace(context=context, get_fully_qualified_name=lambda: "/ready")
+    with fork(lambda: instance.claim(theirs), user=NOBODY):
+        ready = start("-c", program)
+        if starts:
+            assert ready.wait_for_line() == "ready"
+        else:
+            assert ready.end() == (1, f"ready: /ready already runs in domain {domain_id}\n")
 
 
 def test_second_instance_refuses_before_its_first_message(start: Start) -> None:
@@ -387,6 +478,20 @@ def test_unusable_environment_is_reported_without_a_traceback(
     assert (code, ending.output) == (2, "try_shutdown\n")
     assert re.match(f"ending: .*{reason}", errors.splitlines()[-1])
     assert "Traceback" not in errors
+
+
+def test_rclpy_handles_no_signals_and_writes_no_log_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+
+    def init(**options: Any) -> None:
+        given.update(options)
+        raise RuntimeError("planted")
+
+    monkeypatch.setattr(rclpy, "init", init)
+    monkeypatch.setattr(sys, "argv", ["service", "l1", "--ros-args", "-p", "value:=1.0"])
+    assert process._run("service", lambda node: None) == 2
+    assert given["signal_handler_options"] is SignalHandlerOptions.NO
+    assert given["args"] == [*WITHOUT_LOG_FILES, *sys.argv]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

@@ -7,6 +7,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -20,7 +21,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
 from interfaces.service import Rejected, ServiceNode, parameter
-from interfaces.service.parameters import Declaration
+from interfaces.service.parameters import Declaration, declarations
 from reactive_node.stamps import Timestamp
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 
@@ -65,6 +66,7 @@ def test_command_to_the_engines_is_followed_by_the_name_of_its_sender(
     commands: Subject[Any] = Subject()
     service.publish(topics.ENGINES, commands)
     spin_until(lambda: service.count_subscribers(topics.ENGINES_SENDER.name))
+    assert len(commands.observers) == 1, "one recipe runs for both topics"
     for command in (Rejected(topics.ENGINES, "of a recipe"), "bad", topics.TURN_ON, topics.TURN_OFF):
         commands.on_next(command)
     spin_until(lambda: len(heard) == 4)
@@ -245,6 +247,39 @@ def test_bad_or_rejected_item_is_reported_instead_of_published(
     assert 0 <= float(report["seconds_since_output"]) < 5
 
 
+def test_topic_is_read_as_the_contract_says(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[tuple[tuple[Any, ...], dict[str, Any]]] = []
+    for kind in ("", "sampled_", "buffered_"):
+        monkeypatch.setattr(
+            service, f"create_{kind}observable", lambda *args, **options: read.append((args, options))
+        )
+    topic, ticks, on_full = topics.OPERATOR_HEARTBEAT, rx.never(), read.clear
+
+    service.observe(topic)
+    service.observe(topic, timestamped=True)
+    service.observe(topic, max_age=0.5)
+    service.observe_sampled(topic, ticks, timestamped=True)
+    service.observe_buffered(topic, ticks, on_full)
+
+    assert [args for args, _ in read] == [
+        *3 * [(topic.type, topic.name, topic.qos)],
+        *2 * [(topic.type, topic.name, ticks, topic.qos)],
+    ]
+    assert [options["timestamped"] for _, options in read] == [False, True, True, True, False]
+    assert read[0][1]["every_publisher"]
+    assert read[-1][1]["on_full"] is on_full
+
+
+def test_topic_on_demand_is_published_on_demand(
+    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[bool] = []
+    monkeypatch.setattr(service, "publish_observable", lambda *_, on_demand, **__: asked.append(on_demand))
+    service.publish(topics.L1, rx.never())
+    service.publish(topics.L2, rx.never(), on_demand=True)
+    assert asked == [False, True]
+
+
 def at_time(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
 
@@ -280,6 +315,20 @@ def test_messages_that_are_not_fresh_are_dropped(
 
 def test_age_is_by_the_time_of_day(service: ServiceNode) -> None:
     assert service.age(datetime.now(UTC) - timedelta(seconds=5)) == pytest.approx(5.0, abs=1.0)
+
+
+def test_age_of_a_stamp_is_by_ros_time(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(service.scheduler, "time_of_stamps", lambda: 7 * 10**9)
+    assert service.stamp_age(2 * 10**9) == 5.0
+
+
+def test_data_of_a_stranger_that_is_an_error_is_dropped(
+    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dropped: list[tuple[str, str]] = []
+    monkeypatch.setattr(service.health, "drop", lambda *why: dropped.append(why))
+    service.drop("l1", ValueError("an unknown type"))
+    assert dropped == [("l1", "an unknown type")]
 
 
 def test_many_remarks_are_reported_as_four_reasons_and_a_count(
@@ -340,6 +389,8 @@ def test_parameters_are_lists_or_have_no_default(make_node: MakeNode) -> None:
         (("a", "b"), "a", "must be a list of strings, not 'a'"),
         ((1.0,), [1], "must be a list of numbers with a decimal point, not [1]"),
         ((True,), [False], ""),
+        ((True,), [1], "must be a list of true and false, not [1]"),
+        ((1,), [1.0], "must be a list of integers, not [1.0]"),
         (Parameter.Type.INTEGER, 5, ""),
         (Parameter.Type.INTEGER, True, "must be an integer, not True"),
         (Parameter.Type.STRING, None, "must be a string, not None"),
@@ -352,8 +403,25 @@ def test_a_value_has_the_type_of_its_parameter(default: object, value: object, p
 
 @pytest.mark.parametrize("default", [(), None, {}, b"a", (1, "a"), Parameter.Type.BYTE_ARRAY])
 def test_a_parameter_has_a_type_that_files_can_hold(default: object) -> None:
-    with pytest.raises(TypeError, match="cannot be the default of a parameter"):
+    with pytest.raises(TypeError, match=r"cannot be the default of a parameter$"):
         parameter(default, None, "", "")
+
+
+@pytest.mark.parametrize(
+    ("default", "within"), [("b", ("a", "c")), (True, (False, True)), ((1,), ((0,), (2,)))]
+)
+def test_only_a_number_has_a_range(default: Any, within: tuple[Any, Any]) -> None:
+    with pytest.raises(TypeError, match=r"cannot be the default of a parameter with a range$"):
+        parameter(default, within, "", "")
+
+
+def test_parameter_is_fixed_unless_it_is_settable() -> None:
+    fields = [
+        ("fixed", float, parameter(1.0, None, "", "")),
+        ("free", float, parameter(1.0, None, "", "", settable=True)),
+    ]
+    declared = declarations(dataclasses.make_dataclass("Parameters", fields))
+    assert [each.settable for each in declared] == [False, True]
 
 
 def test_only_settable_parameters_can_be_set_at_run_time(service: ServiceNode) -> None:

@@ -215,7 +215,7 @@ def test_states_of_a_simulated_robot_count_by_simulated_time(
     spin_until(states.get_subscription_count)
 
     def play(ahead: float) -> None:
-        robot.set(robot.now + 0.1)
+        robot.set(robot.now + 0.3)
         state = JointState(name=["theta1", "theta2"], position=[robot.now, 0.0])
         sec, nanosec = divmod(round((robot.now + ahead) * 1e9), 10**9)
         state.header.stamp = Time(sec=sec, nanosec=nanosec)
@@ -224,7 +224,7 @@ def test_states_of_a_simulated_robot_count_by_simulated_time(
     angles = robot.heard[THETA1.name]
     for begin in (100.0, 100.0 + DAY, 50.0):  # a jump in each direction
         robot.set(begin)
-        for ahead in (0.0, 0.1):  # of the last /clock
+        for ahead in (0.0, joint_source.Parameters().max_age):  # of the last /clock
             play(ahead)
             spin_until(lambda: angles and angles[-1].data == robot.now)
     for wrong in (-3.0, 3.0):

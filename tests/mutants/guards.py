@@ -111,9 +111,16 @@ GUARDS: dict[str, tuple[str, ...]] = {
     "interfaces/service/health.py": (
         "tests/component/test_health.py",
         "tests/component/test_service_node.py",
+        "tests/component/test_enclave.py",
+        "tests/component/test_states.py",
     ),
     "interfaces/service/instance.py": ("tests/component/test_instance.py",),
-    "interfaces/service/node.py": ("tests/component/test_service_node.py",),
+    "interfaces/service/node.py": (
+        "tests/component/test_service_node.py",
+        "tests/component/test_health.py",
+        "tests/component/test_peers.py",
+        "tests/component/test_enclave.py",
+    ),
     "interfaces/service/parameters.py": (
         "tests/component/test_readme.py",
         "tests/component/test_service_node.py",
@@ -138,13 +145,17 @@ GUARDS: dict[str, tuple[str, ...]] = {
         )
     ),
     f"{REACTIVE_NODE}/end.py": (f"{_NODE_TESTS}/test_end.py",),
-    f"{REACTIVE_NODE}/sampled_reader.py": (f"{_NODE_TESTS}/test_sampled.py",),
+    f"{REACTIVE_NODE}/sampled_reader.py": (
+        f"{_NODE_TESTS}/test_sampled.py",
+        f"{_NODE_TESTS}/test_message_reader.py",
+    ),
     f"{REACTIVE_NODE}/message_reader.py": (
         f"{_NODE_TESTS}/test_message_reader.py",
         f"{_NODE_TESTS}/test_observables.py",
     ),
     f"{REACTIVE_NODE}/shared_reader.py": (
         f"{_NODE_TESTS}/test_observables.py",
+        f"{_NODE_TESTS}/test_sampled.py",
         f"{_NODE_TESTS}/test_events.py",
         f"{_NODE_TESTS}/test_end.py",
     ),

@@ -107,7 +107,7 @@ def test_bound_of_parameters_that_contradict_each_other_is_unknown(sampling: str
 def well(heard: float, host: str = "robot1", **problems: str) -> Arm:
     """Return an arm of three programs on one host, some of which report a problem."""
     reports = {
-        (host, name): Health(heard, 7, name not in problems, problems.get(name, "running"), None)
+        (host, name): Health(heard, 7, name not in problems, problems.get(name, "running"), None, host)
         for name in ("drive", "kinematics", "velocity")
     }
     return Arm("/", 0, Timestamp(ON, heard), Timestamp(ALIVE, heard), reports)
@@ -190,7 +190,7 @@ def test_service_that_falls_silent_is_a_problem() -> None:
 
 def test_host_that_falls_silent_is_still_named() -> None:
     arm = well(10.0)
-    switch = Health(2.0, 7, True, "running", None)
+    switch = Health(2.0, 7, True, "running", None, "desk")
     arm = arm._replace(healths={**arm.healths, ("desk", "dead_mans_switch"): switch})
     assert row(arm, 11.0)[2::3] == ("desk, robot1", "dead_mans_switch: silent")
 

@@ -81,7 +81,8 @@ def test_only_terminal_and_page_set_parameters() -> None:
 
     for service in ("set_parameters", "set_parameters_atomically"):
         assert clients("operator_watchdog", service) == {"terminal"}
-        assert clients("dead_mans_switch", service) == {"terminal", "operator_page"}
+        for node in ("config_l1", "config_l2", "config_theta1", "config_theta2", "dead_mans_switch"):
+            assert clients(node, service) == {"terminal", "operator_page"}
     assert clients("operator_watchdog", "get_parameters") == {"terminal", "tools", "my_gripper"}
 
 
