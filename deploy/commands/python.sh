@@ -2,6 +2,7 @@
 # Runs a module of the checkout with a bare interpreter: before .venv exists, and after it was removed.
 # usage: python.sh MODULE [INTERPRETER]    default: the one of .venv, else the first on the PATH that fits
 set -eu
+exec </dev/null # nothing here reads; in place of a closed one, make may have opened a folder, which stops Python
 
 # Prints the base interpreter of $1: .venv cannot build on a virtual environment, nor on its own remains.
 base_of() {

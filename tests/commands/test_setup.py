@@ -87,6 +87,15 @@ def test_the_interpreter_is_none_of_an_interrupted_set_up(checkout: Path) -> Non
     assert shown.stdout == f"{python.readlink()}\n"
 
 
+def test_a_closed_standard_input_stops_no_command(checkout: Path) -> None:
+    (checkout / "show.py").write_text("import sys; print(sys.stdin.read())")
+    folder = os.open(checkout, os.O_RDONLY)  # as make may leave it
+    command = ["deploy/commands/python.sh", "show"]
+    shown = subprocess.run(command, cwd=checkout, stdin=folder, capture_output=True, text=True)
+    os.close(folder)
+    assert (shown.stdout, shown.stderr) == ("\n", "")
+
+
 def test_an_error_of_the_file_system_is_one_line(checkout: Path) -> None:
     (checkout / ".venv").touch()
     code, errors = set_up(checkout)
