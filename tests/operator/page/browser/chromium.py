@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -97,15 +98,21 @@ def playwright() -> Iterator[Any]:
         yield started
 
 
-def launch(started: Any) -> Any:
-    return started.chromium.launch(
-        executable_path=CHROMIUM,
-        args=FLAGS,
-        headless=False,  # --headless=new is among the flags
-        handle_sigint=False,
-        handle_sigterm=False,
-        handle_sighup=False,
-    )
+@contextmanager
+def launched(started: Any) -> Iterator[Any]:
+    """A browser with a temporary folder of its own, in which it leaves files if it is killed."""
+    with tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True) as folder:
+        browser = started.chromium.launch(
+            executable_path=CHROMIUM,
+            args=FLAGS,
+            env=os.environ | {"TMPDIR": folder},
+            headless=False,  # --headless=new is among the flags
+            handle_sigint=False,
+            handle_sigterm=False,
+            handle_sighup=False,
+        )
+        with closing(browser):
+            yield browser
 
 
 def processes_of(browser: Any) -> list[int]:
@@ -214,6 +221,16 @@ class HandOnPage:
             assert self.stalled, f"not held: {self.state}, {self.why!r}"
             assert time.monotonic() < deadline, "the machine stands still all the time"
             (up or self.up)()
+
+    def hold_until(self, selector: str) -> None:
+        """Hold until the page shows something; begin again if the machine stood still for too long."""
+        while True:
+            self.hold()
+            self.page.wait_for_selector(f"{selector}, #hold:not([data-state=held])", timeout=1000 * LIMIT)
+            if self.page.is_visible(selector):
+                return
+            assert self.stalled, f"not held any more: {self.state}, {self.why!r}"
+            self.up()
 
     def tab_to(self, selector: str) -> None:
         for _ in range(TABS):

@@ -30,13 +30,13 @@ def arm(playwright: Any, tmp_path_factory: pytest.TempPathFactory, module_domain
 
 @pytest.fixture(scope="module")
 def browser(playwright: Any) -> Iterator[Any]:
-    with closing(chromium.launch(playwright)) as browser:
+    with chromium.launched(playwright) as browser:
         yield browser
 
 
 @pytest.fixture
 def own_browser(playwright: Any) -> Iterator[Any]:
-    with closing(chromium.launch(playwright)) as browser:
+    with chromium.launched(playwright) as browser:
         yield browser
 
 

@@ -151,7 +151,7 @@ class PlainPage:
                 [CHROMIUM, *flags, "--window-position=0,0", "about:blank"],
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                env=os.environ | {"DISPLAY": display},
+                env=os.environ | {"DISPLAY": display, "TMPDIR": str(profile)},
             )
             stack.callback(browser.wait, LIMIT)
             stack.callback(browser.terminate)

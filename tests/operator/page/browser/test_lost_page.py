@@ -73,8 +73,7 @@ def test_killed_program_releases_and_comes_back_released(arm: Arm, hand: HandOnP
     arm.record.silence_after(killed, time.time() - killed + 0.5)
     assert arm.site.members["operator_page"] != process
     hand.up()
-    hand.hold()  # the open page finds the new process
-    arm.record.await_beats(time.time())
+    hold_with_engines_on(arm, hand)  # the open page finds the new process
 
 
 def test_stopped_program_releases_and_resumes_released(arm: Arm, hand: HandOnPage) -> None:

@@ -261,8 +261,7 @@ def test_node_that_is_killed_in_the_drawing_heals(arm: Arm, hand: HandOnPage) ->
 
 def test_phone_tells_who_is_the_hand(hand: HandOnPage) -> None:
     hand.page.set_viewport_size({"width": 360, "height": 640})
-    hand.hold()
-    hand.page.wait_for_selector("#mini-operator:visible:text('You hold')", timeout=WAIT)
+    hand.hold_until("#mini-operator:visible:text('You hold')")
     hand.up()
     hand.page.wait_for_selector("#mini-operator:visible:text('Operator')", timeout=WAIT)
 
@@ -277,8 +276,7 @@ def test_last_stop_is_replayed_until_a_hand_holds(arm: Arm, hand: HandOnPage) ->
     assert hand.page.get_attribute("#engines", "data-state") == "off", (
         "the rest of the page shows what is now"
     )
-    hand.hold()
-    hand.page.wait_for_selector("html:not([data-replay]) #arm[data-power=off]", timeout=WAIT)
+    hand.hold_until("html:not([data-replay]) #arm[data-power=off]")
     assert hand.errors == []
 
 
