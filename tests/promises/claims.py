@@ -43,11 +43,9 @@ from tests.promises.lateness import MATCHED
 
 CALM = (
     Reason.SILENT,
-    Reason.SUSPENDED,
     Reason.DEAF,
     Reason.DELAYED,
     Reason.UNDISCOVERED,
-    Reason.REPLACED,
     Reason.OPPOSED,
     Reason.LATE_START,
     *MISSED,
@@ -74,19 +72,20 @@ def drive_runs_by_a_young_on(history: History, found: Sequence[Effect]) -> Itera
     if history.lacks(SENTINEL):  # then this is one host of two, and the drive hears both controllers
         return
     states = history.stream(topics.ENGINES_STATE)
+    delays = [each for each in found if each.why == Reason.DELAYED]
     for one, two in itertools.pairwise(history.stream(topics.DRIVEN_TIME)):
         passed = two.value[0] > one.value[0] and two.value[1] == one.value[1]
-        if not passed or _has_young_on(history, found, two.sent):
+        if not passed or _has_young_on(history, delays, two.sent):
             continue
-        if undisturbed(found, DRIVE, one.sent, two.sent, Reason.SILENT, Reason.SUSPENDED, *MISSED):
+        if undisturbed(found, DRIVE, one.sent, two.sent, Reason.SILENT, *MISSED):
             last = last_sent(states, two.sent)
             since = f"{two.sent - last.sent:.2f} s after an {last.value}" if last else "without any state"
             yield Evidence(two.sent, f"the drive runs {since}")
 
 
-def _has_young_on(history: History, found: Sequence[Effect], time: float) -> bool:
+def _has_young_on(history: History, delays: Sequence[Effect], time: float) -> bool:
     """Return whether a drive may run at a time by one of the states that it may have received last."""
-    quick = undisturbed(found, ALL, time - BAD_TRANSPORT, time, Reason.DELAYED)
+    quick = undisturbed(delays, ALL, time - BAD_TRANSPORT, time, Reason.DELAYED)
     way = TRANSPORT if quick else BAD_TRANSPORT
     states = history.stream(topics.ENGINES_STATE)
     recent = between(states, time - DRIVE_TIMEOUT - SAME, time)
@@ -111,11 +110,9 @@ def _has_young_on(history: History, found: Sequence[Effect], time: float) -> boo
 def present_operator_is_obeyed(history: History, found: Sequence[Effect]) -> Iterator[Evidence]:
     """S3: a `turn_on` turns the engines on while the operator has been present for long enough."""
     given = history.reaction
-    states, signs = history.stream(topics.ENGINES_STATE), [each.sent for each in history.signs_of_life()]
+    states, signs = history.stream(topics.ENGINES_STATE), history.signs_of_life()
     commands = history.stream(topics.ENGINES)
     period = 1.0 / float(given.switch.rate)
-    if given.controller.max_presence_age < given.longest_unseen(period):
-        return  # the switch is so slow that a `turn_on` may come between two reports
     before = given.watchdog.sampling + given.watchdog.reading + period + SEEN
     for command in commands:
         begin, end = command.sent - before, command.sent + 2 * TRANSPORT + given.controller.repeat
@@ -125,10 +122,12 @@ def present_operator_is_obeyed(history: History, found: Sequence[Effect]) -> Ite
             continue
         offs = (each for each in between(commands, begin, end) if each.value == TURN_OFF)
         is_opposed = not all(is_of_watchdog(history, each) for each in offs)
-        pauses = [two - one for one, two in gaps(signs, begin, end)]
+        pauses = [two - one for one, two in gaps((s.sent for s in between(signs, begin, end)), begin, end)]
         seen = between(history.stream(topics.OPERATOR_PRESENCE), begin, command.sent)
-        if is_opposed or max(pauses) > given.watchdog.lifespan:
-            continue
+        if is_opposed or max(pauses) > min(given.watchdog.lifespan, SEEN):
+            continue  # the watchdog may have reported nobody, or reports somebody who came just now later
+        if given.controller.max_presence_age < given.longest_unseen(max(period, *pauses)):
+            continue  # the `turn_on` may come between two reports
         calm = _are_calm(found, (SWITCH, WATCHDOG, CONTROLLER), begin - 2 * before, end)
         if calm:
             why = "although the operator was reported" if seen else "and the operator was not reported"
@@ -159,9 +158,9 @@ def last_strike_stops(history: History, found: Sequence[Effect]) -> Iterator[Evi
     for begin, end in gaps(signs, signs[0] if signs else history.end, history.end):
         for strike in range(1, 1 + int((end - begin - late) // given.silence)):
             due = begin + late + strike * given.silence
-            begins = [*begins[1 - given.strikes :], begin] if given.strikes > 1 else [begin]
-            if any(begins[0] < each <= due + TRANSPORT for each in (*commands, *starts)):
-                begins = []
+            begins.append(begin)
+            if resets := [each for each in (*commands, *starts) if begins[0] < each <= due + TRANSPORT]:
+                begins = [each for each in begins if each > max(resets)]
             elif len(begins) == given.strikes:
                 runs = any(state.value == ON for state in between(states, due + TRANSPORT, due + 1.0))
                 since = begins[0]
@@ -184,7 +183,7 @@ def ends_have_causes(history: History, found: Sequence[Effect]) -> Iterator[Evid
 def _has_cause(history: History, found: Sequence[Effect], life: Life, ended: float) -> bool:
     for fault in history.faults:
         concerns = fault.target in (life.program, ALL, NO_TARGET, OPERATOR)
-        if concerns and fault.begin - SAME <= ended <= max(fault.end, fault.begin) + REPLACING:
+        if concerns and fault.begin - SAME <= ended <= fault.end + REPLACING:
             return True
     if not undisturbed(found, ALL, ended - KILLING, ended, *MISSED):
         return True

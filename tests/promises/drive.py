@@ -11,7 +11,7 @@ import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from operator import itemgetter
+from operator import attrgetter
 from typing import Any
 
 from interfaces import topics
@@ -19,7 +19,7 @@ from interfaces.service.health import BY_HAND, FASTEST
 from tests.promises import claims
 from tests.promises.effects import MISSED, Effect, disturbing
 from tests.promises.findings import Evidence, Finding
-from tests.promises.history import SWITCH, History, between, gaps
+from tests.promises.history import SWITCH, History, Sample, between, gaps
 
 WINDOW = 1.0  # s in which the path of a joint is measured
 AT_ONCE = topics.DRIVE_TIMEOUT + 0.2
@@ -42,7 +42,7 @@ def joints_stand_in_time(history: History, found: Sequence[Effect]) -> Finding:
             continue
         last = max(before for before, _ in moves)
         blind = disturbing(found, SWITCH, begin, last, *MISSED)
-        since = max([begin, *(min(each.end, last) for each in blind)])
+        since = max([begin, *(each.end for each in blind)])
         if since == -math.inf:
             evidence.append(Evidence(last, "a joint moved before the operator's first sign of life"))
         elif last - since > allowed:
@@ -78,17 +78,19 @@ def _jumps(history: History, joint: topics.Topic) -> Iterator[Evidence]:
             yield Evidence(time, f"{joint.name} jumped: {moved}")
 
 
-def _reports(history: History, joint: topics.Topic) -> list[tuple[float, dict[str, Any]]]:
-    """Return when the source of a joint reported its health, and what it reported of the movement."""
-    every = history.stream(topics.DIAGNOSTICS)
-    return [(each.sent, dict(each.value[2:])) for each in every if each.value[0] == joint.publishers[0]]
+def _reports(history: History, joint: topics.Topic) -> list[Sample]:
+    """Return the reports of health of the source of a joint."""
+    return history.health(joint.publishers[0])
 
 
-def _around(reports: list[tuple[float, dict[str, Any]]], begin: float, end: float) -> list[dict[str, Any]]:
-    """Return the reports from before a time to after another one; ``{}`` if one is missing."""
-    first = bisect_left(reports, begin, key=itemgetter(0)) - 1
-    last = bisect_left(reports, end, key=itemgetter(0))
-    known = [report for _, report in reports[max(first, 0) : last + 1]]
+def _around(reports: list[Sample], begin: float, end: float) -> list[dict[str, Any]]:
+    """Return what was reported of the movement from before a time to after another one.
+
+    ``{}`` stands for a report that is missing.
+    """
+    first = bisect_left(reports, begin, key=attrgetter("sent")) - 1
+    last = bisect_left(reports, end, key=attrgetter("sent"))
+    known = [dict(each.value[2:]) for each in reports[max(first, 0) : last + 1]]
     return [*known, {}] if first < 0 or last == len(reports) else known
 
 
@@ -102,6 +104,14 @@ def _moves(history: History, joint: topics.Topic, begin: float, end: float) -> l
     return [
         (one.sent, two.sent)
         for one, two in samples
-        if one.value != two.value
-        and not any(BY_HAND in report for report in _around(reports, two.sent, two.sent))
+        if one.value != two.value and not _by_hand(reports, two.sent)
     ]
+
+
+def follows_the_drive(history: History, time: float) -> bool:
+    """Return whether a joint may follow the drive at a time: not all of them are set by hand."""
+    return not all(_by_hand(_reports(history, joint), time) for joint in topics.JOINTS)
+
+
+def _by_hand(reports: list[Sample], time: float) -> bool:
+    return any(BY_HAND in report for report in _around(reports, time, time))

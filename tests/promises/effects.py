@@ -109,7 +109,7 @@ def _of_faults(history: History) -> Iterator[Effect]:
             silent = (SWITCH, *names.DEPENDENTS[SWITCH])
             yield Effect(silent, _from(begin), _to(end + recovery), Reason.SILENT, fault)
         if kind in names.SUSPENDING:
-            yield Effect((target,), begin, end, Reason.SUSPENDED, fault)
+            yield Effect((target,), begin, replaced, Reason.SUSPENDED, fault)
             if target in (WATCHDOG, ALL):
                 yield Effect((WATCHDOG,), begin, replaced, Reason.DEAF, fault)
         if kind == names.PARTITION:
@@ -131,9 +131,10 @@ def _of_faults(history: History) -> Iterator[Effect]:
             yield Effect((WATCHDOG, CONTROLLER), begin, end + SLOWEST, Reason.DELAYED, fault)
         if kind == STEP:  # while it spreads, clocks differ, and the age of a heartbeat is wrong
             yield Effect((WATCHDOG,), begin, begin + SPREAD, Reason.DEAF, fault)
-            # It publishes values of one time, and waits again until the first ones are known.
+            # It publishes values of one time, and waits again until the first ones are known. A speed needs
+            # two positions whose stamps ascend.
             known = begin + SPREAD + states.LATENESS + states.GAP
-            yield Effect((ROBOT_STATE,), begin, known, Reason.STILL, fault)
+            yield Effect((ROBOT_STATE, VELOCITY), begin, known, Reason.STILL, fault)
         if target in (SENTINEL, ALL):
             yield Effect((ALL,), begin - AT_ONCE, end, Reason.UNWATCHED, fault)
         if target in SOURCES:  # it sends a value to one reader after the other

@@ -179,7 +179,14 @@ class History:
 
     def health(self, program: str) -> list[Sample]:
         """Return the reports of health of a program."""
-        return [s for s in self.stream(topics.DIAGNOSTICS) if s.value[0] == program]
+        return self._healths.get(program, [])
+
+    @cached_property
+    def _healths(self) -> dict[str, list[Sample]]:
+        found: defaultdict[str, list[Sample]] = defaultdict(list)
+        for sample in self.stream(topics.DIAGNOSTICS):
+            found[sample.value[0]].append(sample)
+        return found
 
     def signs_of_life(self) -> list[Sample]:
         return [s for s in self.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
@@ -199,12 +206,12 @@ class History:
         }
 
     def effect_end(self, fault: InjectedFault) -> float:
-        """Return when a fault ended, or earlier, when its target was replaced."""
+        """Return when a fault ended, or earlier, when its target was replaced; a hang ends only then."""
         if fault.kind not in SUSPENDING:
             return fault.end
-        target = (fault.target, fault.pid)
-        ends = [life.ended for life in self.lives if (life.program, life.pid) == target and life.ended]
-        return min([fault.end, *ends])
+        lives = [life for life in self.lives if (life.program, life.pid) == (fault.target, fault.pid)]
+        end = max(fault.end, self.end) if fault.kind == "hang" and lives else fault.end
+        return min([end, *(life.ended for life in lives if life.ended)])
 
 
 def target_name(target: str) -> str:

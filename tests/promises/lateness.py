@@ -50,7 +50,7 @@ def _slow_lines(history: History) -> Iterable[Interval]:
             yield fault.begin, fault.end + REDISCOVERY
     for kind, begin, end in history.conditions:
         if kind == LOSS and end > history.end:  # it was planned: DDS sends again what was lost
-            yield begin, end + REDISCOVERY
+            yield begin, end
 
 
 def _publishers(topic: topics.Topic, sample: Sample) -> Iterable[str]:

@@ -34,6 +34,7 @@ from tests.promises.history import (
     ROBOT_STATE,
     SENTINEL,
     SOURCES,
+    SUSPENDING,
     SWITCH,
     History,
     InjectedFault,
@@ -55,11 +56,11 @@ def output_resumes(history: History, found: Sequence[Effect]) -> Finding:
     silences: dict[str, list[tuple[float, float]]] = {}  # how long, and when they began
     evidence, unknown = [], 0
     for fault in _kills(history):
-        time = _recovery(history, fault)
+        time, begin = _recovery(history, fault), _death(history, fault)
         if (
             time is None
-            or not _is_alone(found, fault, fault.begin, fault.begin + min(time, SLOWEST))
-            or any(_paused(found, fault, time, bound) for bound in (MEDIAN, SLOWEST))
+            or not _is_alone(found, fault, fault.begin, begin + min(time, SLOWEST))
+            or any(_excused(found, fault.target, begin, time, bound) for bound in (MEDIAN, SLOWEST))
         ):
             unknown += 1
         else:
@@ -86,14 +87,15 @@ def _kills(history: History) -> Iterator[InjectedFault]:
 def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evidence]:
     """Yield programs without output after a fault of any kind, unless another fault explains it."""
     for fault in history.faults:
-        begin, end = fault.end, fault.end + GONE
+        begin = max(fault.end, _death(history, fault))
+        end = begin + GONE
         if end > history.end:
             continue
         for program in history.programs if fault.target == ALL else (fault.target,):
             if history.lacks(program):
                 continue
             output = history.output(program)
-            if between(output, begin, end):
+            if between(output, begin + SAME, end):
                 continue
             # A constant is published once: then the health shows that the program works.
             is_constant = program in SOURCES and len({each.value for each in output}) == 1
@@ -103,7 +105,10 @@ def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evid
             # Where nothing moves, there is nothing to publish.
             if end - begin <= disturbed_for(found, program, begin, end, Reason.STILL) + FLOWING:
                 continue
-            if _is_alone(found, fault, begin, end, program):
+            # A program that waits for a value needs time after that, too.
+            if end - begin < disturbed_for(found, program, begin, end, Reason.WAITING) + HUNG:
+                continue
+            if undisturbed(found, program, begin, end, Reason.SILENT, but=fault):
                 yield Evidence(end, f"{program} is silent for {GONE:g} s after {fault.kind}")
 
 
@@ -122,7 +127,7 @@ def other_streams_flow(history: History, found: Sequence[Effect]) -> Finding:
         if GAP < (period := _period(history.output(program))) < math.inf
     ]
     for fault in _kills(history):
-        end = fault.begin + min(_recovery(history, fault) or SLOWEST, SLOWEST)
+        end = _death(history, fault) + min(_recovery(history, fault) or SLOWEST, SLOWEST)
         for program in streams:
             if not _flowed(history, program, fault.begin, GAP):
                 continue
@@ -201,7 +206,7 @@ def right_after_restart(history: History, found: Sequence[Effect]) -> Finding:
         time = _recovery(history, fault)
         if time is None:
             continue
-        begin = fault.begin + time + SETTLED
+        begin = _death(history, fault) + time + SETTLED
         if not undisturbed(found, KINEMATICS, begin, begin + 1.0, Reason.SILENT, but=fault):
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
@@ -231,7 +236,7 @@ def hung_is_replaced(history: History, found: Sequence[Effect]) -> Finding:
             time is None
             or not undisturbed(found, fault.target, fault.begin - BEFORE, until, Reason.UNWATCHED, but=fault)
             or not _is_alone(found, fault, fault.begin, until)
-            or _paused(found, fault, time, HUNG)
+            or _excused(found, fault.target, fault.begin, time, HUNG)
         ):
             unknown += 1
             continue
@@ -274,20 +279,23 @@ def _recovery(history: History, fault: InjectedFault) -> float | None:
         return None
     begin = _death(history, fault)
     silent = begin + SAME
-    if fault.kind in HANGS and any(life.pid == fault.pid for life in history.lives_of(fault.target)):
+    if fault.kind in SUSPENDING and any(life.pid == fault.pid for life in history.lives_of(fault.target)):
         # A busy machine still sends what was begun: only its successor ends the silence, or its return.
         silent = max(silent, history.effect_end(fault) - RESTARTED)
-    following = [s.received for s in between(output, silent, history.end)]
-    if following:
-        return min(following) - begin
+    if following := between(output, silent, history.end):
+        # One that was sent later may be received earlier.
+        return min(s.received for s in between(following, silent, following[0].received)) - begin
     # Silent for good, if the record is long enough to show it.
     return math.inf if history.end - begin > HUNG else None
 
 
-def _paused(found: Sequence[Effect], fault: InjectedFault, time: float, bound: float) -> bool:
-    """Return whether a silence after a fault is above a bound only because the whole machine paused."""
-    missed = disturbed_for(found, ALL, fault.begin, fault.begin + time, *MISSED)
-    return time > bound >= time - missed
+def _excused(found: Sequence[Effect], program: str, begin: float, time: float, bound: float) -> bool:
+    """Return whether a silence that began at a time is above a bound only for another reason.
+
+    The whole machine paused, or there was nothing to publish.
+    """
+    excused = disturbed_for(found, program, begin, begin + time, *MISSED, Reason.STILL)
+    return time > bound >= time - excused
 
 
 def _death(history: History, fault: InjectedFault) -> float:
@@ -306,16 +314,10 @@ def _flowed(history: History, program: str, time: float, within: float) -> bool:
     return bool(between(history.output(program), time - within, time))
 
 
-def _is_alone(
-    found: Sequence[Effect], fault: InjectedFault, begin: float, end: float, program: str = ""
-) -> bool:
-    """Return whether only this fault disturbs the return of a program (default: of the target)."""
-    program = program or fault.target
-    # If all were hit, those that it follows had to start as well.
-    followed = [each for each, dependents in DEPENDENTS.items() if program in dependents]
-    starting = (program, *followed) if fault.target == ALL else (program,)
-    return undisturbed(found, program, begin, end, Reason.SILENT, but=fault) and all(
-        undisturbed(found, each, time, time, Reason.WAITING) for each in starting for time in (begin, end)
+def _is_alone(found: Sequence[Effect], fault: InjectedFault, begin: float, end: float) -> bool:
+    """Return whether only this fault disturbs the return of its target."""
+    return undisturbed(found, fault.target, begin, end, Reason.SILENT, but=fault) and all(
+        undisturbed(found, fault.target, time, time, Reason.WAITING) for time in (begin, end)
     )
 
 

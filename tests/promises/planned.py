@@ -14,6 +14,7 @@ from itertools import pairwise
 from operator import itemgetter
 
 from interfaces import topics
+from tests.promises.drive import follows_the_drive
 from tests.promises.findings import Evidence, Finding, count, how_often
 from tests.promises.history import (
     CONTROLLER,
@@ -63,11 +64,11 @@ def planned(history: History) -> dict[str, int]:
     silences = [each for each in history.conditions if each.kind == SILENCE]
     allowed = history.reaction.off_within + LONGER
     long = [each for each in silences if each.end - each.begin > allowed]
-    stops = sum(each.end < history.end and runs(each.begin) for each in long)
+    stops = [each.begin for each in long if each.end < history.end and runs(each.begin)]
     kills = [each for each in history.faults if each.kind == "kill"]
     of_values = [each for each in history.faults if each.target in (KINEMATICS, *SOURCES)]
     return {
-        "S1": stops,
+        "S1": len(stops),
         "S2": sum(
             each.target != CONTROLLER and runs(each.begin) and _is_held(silences, each.begin)
             for each in kills
@@ -76,7 +77,7 @@ def planned(history: History) -> dict[str, int]:
             min(two.begin, history.end) - one.end > HELD for one, two in pairwise(silences) if one in long
         ),
         "S5": sum(each.pid > 0 for each in kills),
-        "S6": stops if history.stream(topics.DRIVEN_TIME) else 0,
+        "S6": sum(follows_the_drive(history, at) for at in stops if history.stream(topics.DRIVEN_TIME)),
         "L2": FLOWING * len(kills),
         "L3": sum(each.kind in MOMENTARY and flows(each) for each in of_values),
     }

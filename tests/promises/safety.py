@@ -46,8 +46,8 @@ from tests.promises.positions import PublishedValues, may_lack_values
 
 LETTING_GO = 1.0  # s from the operator's release until no heartbeat may come
 FAIL_SAFES = {
-    WATCHDOG: (Reason.SILENT, Reason.SUSPENDED, Reason.DEAF, Reason.DELAYED, *MISSED),
-    CONTROLLER: (Reason.SILENT, Reason.SUSPENDED, *MISSED),
+    WATCHDOG: (Reason.SILENT, Reason.DEAF, Reason.DELAYED, *MISSED),
+    CONTROLLER: (Reason.SILENT, *MISSED),
 }
 """The programs of F1 and F2 (deploy/SAFETY.md), and the effects that may keep them from acting in time."""
 
@@ -72,6 +72,9 @@ def engines_off_in_time(history: History, found: Sequence[Effect]) -> Finding:
         if since == -math.inf:
             evidence.append(Evidence(late[0][0], "engines on before the operator's first sign of life"))
             continue
+        if end - begin <= min(longest_undisturbed, given.off_undisturbed, given.controller.max_presence_age):
+            longest = max(longest, lasted)
+            continue  # nearly each time between two heartbeats: what its faults allow makes no difference
         stopped = min(late[-1][1], end)
         allowed = _allowed(history, found, begin, stopped)
         if lasted <= allowed < stopped - begin:
@@ -98,7 +101,12 @@ def engines_stay_on(history: History, found: Sequence[Effect]) -> Finding:
     """S2: while the operator is alive, killing any service but the controller keeps the engines on."""
     evidence, permitted, kills, unknown = [], 0, 0, 0
     for on, off in _changes(history, ON, OFF):
-        if _was_away(found, on, off) or _commanded(history, found, off) or _abandoned(history, found, off):
+        if (
+            _was_away(found, on, off)
+            or _was_interrupted(history, found, on)
+            or _commanded(history, found, off)
+            or _abandoned(history, found, off)
+        ):
             permitted += 1
         elif not undisturbed(found, ALL, off.sent - BEFORE, off.sent, *MISSED):
             unknown += 1  # the observer may have missed the command
@@ -123,6 +131,8 @@ def turned_on_with_operator(history: History, found: Sequence[Effect]) -> Findin
     evidence, cases, unknown, oldest = [], 0, 0, 0.0
     before = -math.inf
     for stopped, on in _starts(history):
+        if _was_interrupted(history, found, on):
+            continue
         # A command turns the engines on once; the next start needs another one.
         command = between(commands, max(before, on.sent - age - TRANSPORT), on.sent + SAME)
         before = on.sent + SAME + 0.001
@@ -265,6 +275,15 @@ def _was_away(found: Sequence[Effect], on: Sample, off: Sample) -> bool:
     return paused and off.sent - on.sent > DRIVE_TIMEOUT
 
 
+def _was_interrupted(history: History, found: Sequence[Effect], on: Sample) -> bool:
+    """Return whether a suspension interrupted the sending of an `on`; an `off` follows it at once then."""
+    states = between(history.stream(topics.ENGINES_STATE), on.sent, on.sent + SAME)
+    just_before = disturbing(found, CONTROLLER, on.sent - SAME, on.sent, Reason.SUSPENDED)
+    return any(state.value == OFF for state in states) and any(
+        effect.end <= on.sent + SAME for effect in just_before
+    )
+
+
 def _was_present(history: History, time: float) -> bool:
     """Return whether the operator watchdog reported the operator's presence just before."""
     presences = history.stream(topics.OPERATOR_PRESENCE)
@@ -315,8 +334,9 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     )
     starts = (life.began for life in history.lives_of(WATCHDOG) if life.began < time)
     since = max([*commands, *starts], default=0.0)
-    heartbeats = [s.sent for s in history.signs_of_life()]
-    begin = max((t for t in heartbeats if t <= since), default=0.0)
+    signs = history.signs_of_life()
+    last = last_sent(signs, since)
+    begin = last.sent if last else 0.0
     given = history.reaction.watchdog
     # A suspended watchdog receives no heartbeat either, nor the last one before; S2 does not cover that.
     deaf = [
@@ -324,6 +344,7 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
         for effect in disturbing(found, WATCHDOG, begin, time, Reason.DEAF)
     ]
     # Intervals that only touch have a heartbeat in between.
+    heartbeats = (each.sent for each in between(signs, begin, time))
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
     return sum((end - begin + given.sampling) // given.silence for begin, end in silences)
 

@@ -14,6 +14,7 @@ from tests.promises.history import (
     CONTROLLER,
     DRIVE,
     FALSE_PRESENCE,
+    FUTURE_PRESENCE,
     NO_TARGET,
     STUCK_DRIVE,
     SWITCH,
@@ -95,6 +96,28 @@ def test_report_names_what_the_watchdog_concluded_late_and_a_stranger(
     )
     assert watchdog == f"{strikes}, {words}"
     assert controller.endswith("15.00 s at most, and a stranger sent others (injected)")
+
+
+@pytest.mark.parametrize(
+    ("kind", "end", "words"),
+    [
+        (FALSE_PRESENCE, 30.0, ", and a stranger sent others (injected)"),
+        (FUTURE_PRESENCE, 30.0, ", and a stranger sent others (injected)"),
+        (FUTURE_PRESENCE, 20.0, " s at most"),  # it had gone before the last on
+    ],
+)
+def test_report_on_the_controller_names_a_stranger_of_that_time(kind: str, end: float, words: str) -> None:
+    judged = replace(STILL_ON, faults=[InjectedFault(kind, NO_TARGET, 5.0, end)])
+    assert account(judged, "S1", Evidence(15.45, "engines still on"))[2].endswith(words)
+
+
+def test_report_names_the_process_and_the_faults_of_its_time() -> None:
+    before, after = (
+        account(STILL_ON, "L1", Evidence(at, "operator_watchdog is silent for 4.00 s")) for at in (11.0, 18.0)
+    )
+    assert before[0].startswith("operator_watchdog (13) was heard last")
+    assert before[-1] == "injected: stuck_drive of (no target) at 5.00 s"
+    assert after[-1] == f"{before[-1]}, kill of operator_watchdog at 11.50 s"
 
 
 def test_report_on_a_joint_that_moved_too_late_names_the_drive() -> None:

@@ -41,7 +41,8 @@ def test_s6_joint_that_stands_in_time(joint: str) -> None:
 
 @pytest.mark.parametrize("joint", ["theta1", "theta2"])
 def test_s6_joint_that_moves_too_late(joint: str) -> None:
-    found = CHECKERS["S6"](history(joint, [(12.0, 0.25), (13.0, 0.5), (13.25, 0.75)]))
+    blind = Condition(OVERLOAD, 13.125, 14.0)  # too late to hide a sign of life
+    found = CHECKERS["S6"](history(joint, [(12.0, 0.25), (13.0, 0.5), (13.25, 0.75)], blind))
 
     text = "a joint still moved 11.00 s after the operator's last sign of life"
     assert (found.cases, found.evidence) == (1, [Evidence(13.25, text)])
@@ -172,6 +173,11 @@ def test_s6_joint_that_is_set_by_hand_may_jump() -> None:
     assert jumping(*moves, reports=IN_THE_TWENTIES) == []
     assert jumping(*moves, reports=IN_THE_TWENTIES, alive=False) == []
     assert len(jumping(*moves)) == 3
+
+
+def test_s6_joint_that_was_set_by_hand_may_not_move_too_late() -> None:
+    (found,) = jumping((19.9, 0.0), (21.5, 3.0), reports=UNTIL_20, alive=False)
+    assert found.time == 21.5
 
 
 UNTIL_20, FROM_20 = each_second(SET, SLOW, 20.5), each_second(SLOW, SET, 20.0)

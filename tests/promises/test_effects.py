@@ -18,6 +18,7 @@ from tests.promises.history import (
     SENTINEL,
     SOURCES,
     SWITCH,
+    VELOCITY,
     WATCHDOG,
     Condition,
     History,
@@ -121,12 +122,23 @@ def rows(
             ],
         ),
         (
+            "lose",
+            "engines",
+            [({"engines"}, 10.0, 16.0, Reason.SILENT), ({WATCHDOG, CONTROLLER}, 10.0, 16.0, Reason.DELAYED)],
+        ),
+        ("lose", "theta1", [({"theta1"}, 10.0, 16.0, Reason.SILENT)]),
+        (
+            "rival",
+            NO_TARGET,
+            [({NO_TARGET}, 10.0, 16.0, Reason.SILENT), ({CONTROLLER}, 10.0, 24.0, Reason.OPPOSED)],
+        ),
+        (
             "step_clock",
             NO_TARGET,
             [
                 ({NO_TARGET}, 10.0, 16.0, Reason.SILENT),
                 ({WATCHDOG}, 10.0, 11.0, Reason.DEAF),
-                ({ROBOT_STATE}, 10.0, 11.15, Reason.STILL),
+                ({ROBOT_STATE, VELOCITY}, 10.0, 11.15, Reason.STILL),
             ],
         ),
     ],
@@ -175,6 +187,7 @@ def test_fault_from_10_to_14_s_keeps_heartbeats_from_the_watchdog_of_a_quick_arm
 def test_replaced_process_is_no_longer_suspended() -> None:
     lives = [Life(WATCHDOG, 7, 0.0, 12.0)]
     found = rows([InjectedFault("hang", WATCHDOG, 10.0, 25.0, 7)], lives)
+    assert ({WATCHDOG}, 10.0, 12.0, Reason.SUSPENDED) in found
     assert ({WATCHDOG}, 10.0, 12.0, Reason.DEAF) in found
     assert ({WATCHDOG, *DEPENDENTS[WATCHDOG]}, 10.0, 17.0, Reason.SILENT) in found
 
@@ -192,6 +205,12 @@ def test_replaced_process_is_no_longer_suspended() -> None:
 def test_effects_of_a_start(program: str, expected: list[Row]) -> None:
     found = rows(lives=[Life(program, 7, 10.25, None)])
     assert found == [({program}, 10.25, 12.25, Reason.LATE_START), *expected]
+
+
+@pytest.mark.parametrize("program", [SWITCH, CONTROLLER, SENTINEL])
+def test_second_process_that_ends_before_the_first_replaces_nothing(program: str) -> None:
+    found = rows(lives=[Life(program, 7, 0.0, None), Life(program, 8, 10.25, 11.0)])
+    assert [row for row in found if row[1] > 10.0] == [({program}, 10.25, 12.25, Reason.LATE_START)]
 
 
 def test_source_without_a_message_stays_undiscovered() -> None:
@@ -215,6 +234,59 @@ def test_silent_source_keeps_a_new_program_waiting() -> None:
         *[(-math.inf, 0.0)] * 3,
     ]
     assert {*found[1].programs} == {KINEMATICS, ROBOT_STATE}
+
+
+@pytest.mark.parametrize(
+    ("lives", "faults", "since"),
+    [
+        ([], [], [11.0]),
+        ([(0.0, None)], [], []),
+        ([(0.0, 12.0)], [], [12.0]),
+        ([(0.0, 7.0), (7.5, 12.0)], [], [12.0]),
+        ([(0.0, 7.0), (13.0, None)], [], [11.0]),
+        ([(0.0, None)], [("stop", "config_l1", 15.0)], [15.0]),
+        ([(0.0, None)], [("stop", "config_l1", 3.0)], []),
+        ([(0.0, None)], [("stop", "config_l2", 15.0)], []),
+        ([(0.0, None)], [("double", "config_l1", 15.0)], []),
+    ],
+)
+def test_source_gives_its_last_rare_value_to_new_programs_while_it_runs(
+    lives: list[tuple[float, float | None]], faults: list[tuple[str, str, float]], since: list[float]
+) -> None:
+    rare = [Sample(at, at, 0.0) for at in (0.0, 5.0, 10.0, 11.0, 20.0)]
+    flowing = [Sample(float(at), float(at), 0.0) for at in range(30)]
+    history = History(
+        30.0,
+        dict.fromkeys(topics.CONFIGURATION, flowing) | {"l1": rare},
+        [Life("config_l1", 7, *life) for life in lives],
+        [InjectedFault(kind, target, begin, begin + 1.0) for kind, target, begin in faults],
+    )
+    found = [each for each in effects(history) if each.why == Reason.WAITING and each.end == 20.0]
+    assert [each.begin for each in found] == since
+
+
+def still(history: History) -> list[tuple[tuple[str, ...], float, float]]:
+    """Return which programs have nothing to publish, and when."""
+    found = (each for each in effects(history) if each.why == Reason.STILL)
+    return [((*each.programs,), each.begin, each.end) for each in found]
+
+
+def sent(*times: float) -> list[Sample]:
+    return [Sample(at, at, 0.0) for at in times]
+
+
+def test_kinematics_has_nothing_to_publish_while_all_sources_are_silent() -> None:
+    history = History(9.0, {"l1": sent(1.0, 3.0), "theta2": sent(1.25, 2.0, 2.25)})
+    times = [(-math.inf, 1.0), (1.25, 2.0), (2.25, 3.0), (3.0, math.inf)]
+    assert still(history) == [((KINEMATICS,), *each) for each in times]
+
+
+def test_velocity_has_nothing_to_publish_from_the_last_move_to_the_next_one() -> None:
+    positions = {1.0: (0.0, 0.0), 1.25: (0.0, 1.0), 1.5: (0.0, 1.0), 2.5: (1.0, 1.0), 3.0: (1.0, 1.0)}
+    stream = [Sample(at, at, value) for at, value in positions.items()]
+    history = History(5.0, {"effector/position": stream, "l1": sent(*(at / 4 for at in range(21)))})
+    found = [each for each in still(history) if each[0] != (KINEMATICS,)]
+    assert found == [((VELOCITY,), 1.25, 2.5), ((VELOCITY,), 2.5, 5.0)]
 
 
 def test_last_values_of_a_record_may_be_missing() -> None:

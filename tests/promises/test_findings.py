@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import pytest
 
+from interfaces.robot_model import forward_kinematics
 from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
 from tests.promises.effects import TRANSPORT
 from tests.promises.findings import Evidence, Finding
@@ -16,9 +18,12 @@ from tests.promises.history import (
     BAD_LINE,
     CONTROLLER,
     HOLD,
+    HOST,
     KINEMATICS,
+    LOSE,
     NO_TARGET,
     OPERATOR,
+    RIVAL,
     STUCK_DRIVE,
     SWITCH,
     WATCHDOG,
@@ -56,6 +61,7 @@ def overload(begin: float, end: float) -> Condition:
 # S1
 
 KEPT_ON = "operator_watchdog sent no turn_off, engine_controller still sent on"
+KEPT_BY_THE_DRIVE = "operator_watchdog sent no turn_off, the drive kept the last command"
 STOPPED = [InjectedFault("stop", each, 0.0, 40.0) for each in ("operator_watchdog", "engine_controller")]
 """Faults after which only the drive stops the engines."""
 
@@ -90,7 +96,9 @@ def test_s1_tells_the_longest_time_with_and_without_faults() -> None:
 
 def test_s1_evidence_has_the_moment_of_the_violation() -> None:
     states = engines((1.0, ON), (1.5, OFF), (5.0, ON), (17.0, OFF))
-    assert CHECKERS["S1"](history(heartbeats=[(5.0, True)], states=states, faults=STOPPED)) == Finding(
+    late = [(16.0, TURN_OFF)]
+    judged = history(heartbeats=[(5.0, True)], states=states, commands=late, faults=STOPPED)
+    assert CHECKERS["S1"](judged) == Finding(
         "S1",
         1,
         "off within 12.00 s, allowed 10.5 s",
@@ -104,6 +112,36 @@ def test_s1_evidence_has_the_moment_of_the_violation() -> None:
         ],
         worst=12.0,
     )
+
+
+def test_s1_controller_that_sent_an_on_just_before_kept_the_engines_on() -> None:
+    states = steps(2, 12.25, value=ON)  # the drive keeps the last one for 0.4 s
+    (evidence,) = CHECKERS["S1"](history(heartbeats=[(2.0, True)], states=states, faults=STOPPED)).evidence
+    assert (evidence.time, evidence.cause) == (12.5, KEPT_ON)
+
+
+def test_s1_short_silence_is_a_case_after_a_long_one() -> None:
+    states = engines((1.0, ON), (11.0, OFF), (20.0, ON), (23.0, OFF))
+    heartbeats = [*steps(1, 2), *steps(19, 21), *steps(26, 27)]
+    assert CHECKERS["S1"](history(heartbeats=heartbeats, states=states)).cases == 2
+
+
+@pytest.mark.parametrize(
+    ("fault", "off", "found"),
+    [
+        (InjectedFault("kill", WATCHDOG, 11.0, 11.0), 12.25, 0),
+        (InjectedFault("kill", WATCHDOG, 13.0, 13.0), 12.25, 1),  # the engines were off
+        (InjectedFault(STEP, NO_TARGET, 5.0, 5.0), 12.25, 0),
+        (InjectedFault(LOSE, "engines", 5.0, 13.0), 12.25, 0),
+        (InjectedFault(LOSE, "engines", 5.0, 13.0), 12.5, 1),  # F2 needs no command
+        (InjectedFault(HOLD, "operator_presence", 5.0, 13.0), 12.25, 1),
+    ],
+)
+def test_s1_fault_of_one_fail_safe_allows_what_the_next_one_needs(
+    fault: InjectedFault, off: float, found: int
+) -> None:
+    judged = history(heartbeats=[(2.0, True)], states=engines((2.0, ON), (off, OFF)), faults=[fault])
+    assert len(CHECKERS["S1"](judged).evidence) == found
 
 
 @pytest.mark.parametrize(
@@ -181,7 +219,7 @@ def test_s1_stuck_drive_keeps_the_engines_on(begin: float, end: float, lasted: f
     stuck = InjectedFault(STUCK_DRIVE, NO_TARGET, begin, end)
     found = CHECKERS["S1"](history(heartbeats=[(2.0, True)], states=states, faults=[stuck]))
     assert found.worst == pytest.approx(min(lasted, end - 2.0) if lasted > 9.0 else 4.0 + DRIVE_TIMEOUT)
-    assert bool(found.evidence) is (lasted > 10.5)
+    assert [each.cause for each in found.evidence] == [KEPT_BY_THE_DRIVE] * (lasted > 10.5)
 
 
 # S2
@@ -199,6 +237,26 @@ def test_s2_overload_just_before_makes_the_outcome_unknown() -> None:
         [Evidence(30.0, "engines turned off although the operator was present")],
         2,
     )
+
+
+@pytest.mark.parametrize(
+    ("stop", "resume", "off", "is_blamed"),
+    [
+        (10.25, 14.0, 14.0, False),  # its `on` was ready when it was suspended
+        (10.25, 13.996, 14.004, False),
+        (10.25, 13.97, 14.0, True),  # it had time to see how long it had stood still
+        (10.25, 15.0, 14.0, True),  # it runs although it is suspended
+        (10.25, 14.0, 14.03, True),  # the engines start
+    ],
+)
+def test_s2_and_s3_allow_an_on_that_a_suspension_interrupts(
+    stop: float, resume: float, off: float, is_blamed: bool
+) -> None:
+    states = [*steps(0, 10.25, value=ON), (14.0, ON), *steps(off, 40, value=OFF)]
+    stop_of_controller = stopped(CONTROLLER, stop, resume)
+    arm = history(**PRESENT, states=states, commands=[(0.0, TURN_ON)], faults=[stop_of_controller])
+    assert [each.time for each in CHECKERS["S2"](arm).evidence] == [off] * is_blamed
+    assert [each.time for each in CHECKERS["S3"](arm).evidence] == [14.0] * is_blamed
 
 
 def test_s2_counts_kills_while_engines_are_on_and_the_operator_is_present() -> None:
@@ -247,6 +305,7 @@ AFTER_A_PAUSE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if
 UNSEEN = {"presences": steps(0, 10), "heartbeats": steps(0, 40)}
 FIRST_UNSEEN = 20.0 - 10.0 + 0.1 + TRANSPORT
 SHORT = heard_but_in(*SILENCES[:2], (12.0, 14.25))  # the last silence lacks 0.75 s of a strike
+OFF_AT_14_5 = engines((0.0, ON), (14.5, OFF))  # the third strike is counted at this time
 COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCES)}
 
 
@@ -267,12 +326,17 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         ({"states": AFTER_A_PAUSE, "faults": [stopped(CONTROLLER, 5.0, 6.0)]}, False),
         ({"faults": [stopped(CONTROLLER, 19.75, 20.0)]}, False),
         ({"states": [(0.0, ON), (DRIVE_TIMEOUT, OFF)], "faults": [stopped(CONTROLLER, 0.125, 0.25)]}, False),
+        # a rival opposed it, and may not have gone until ten seconds later
+        ({"faults": [stopped(NO_TARGET, 5.0, 9.875, RIVAL)]}, True),
+        ({"faults": [stopped(NO_TARGET, 5.0, 9.75, RIVAL)]}, False),
         # the watchdog commanded it
         (COMMANDED, True),
         (COMMANDED | {"commands": [(20.5, TURN_OFF)]}, False),
         (COMMANDED | {"commands": [(18.0, TURN_ON), (20.0, TURN_OFF)]}, True),
         (COMMANDED | {"commands": [(19.0, TURN_OFF), (20.0, TURN_OFF)]}, True),
         (COMMANDED | {"commands": [(18.5, TURN_OFF), (20.0, TURN_OFF)]}, False),
+        (COMMANDED | {"commands": [(14.375, TURN_OFF), (14.5, TURN_OFF)], "states": OFF_AT_14_5}, True),
+        (COMMANDED | {"commands": [(14.375, TURN_OFF)], "states": OFF_AT_14_5}, False),
         (COMMANDED | {"lives": two_lives(WATCHDOG, 10.0)}, False),
         (COMMANDED | {"lives": two_lives(WATCHDOG, 20.0)}, True),
         (
@@ -335,6 +399,12 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
             COMMANDED
             | {"heartbeats": heard_but_in(*SILENCES[1:]), "faults": [stopped(WATCHDOG, 13.0, 18.0)]},
             True,
+        ),
+        # when it was cut off later than three silences ago, it had too few strikes
+        (
+            COMMANDED
+            | {"heartbeats": steps(0.25, 40), "faults": [stopped(NO_TARGET, 14.0, 30.0, "partition")]},
+            False,
         ),
         # while a step of the time of day spreads, heartbeats have a wrong age
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.0, 14.0, STEP)]}, True),
@@ -437,6 +507,32 @@ def test_s3_new_switch_or_overload_makes_the_outcome_unknown() -> None:
     assert (found.cases, found.unknown) == (0, 4)
 
 
+@pytest.mark.parametrize(
+    ("stop", "event", "unknown"),
+    [
+        (19.75, stopped(NO_TARGET, 5.0, 9.875, RIVAL), 1),
+        (19.75, stopped(NO_TARGET, 5.0, 9.5, RIVAL), 0),  # it had gone before the engines stopped
+        (10.0, stopped(NO_TARGET, 5.0, 8.75, RIVAL), 0),  # and long before they started
+        (19.75, overload(19.5, 19.875), 1),
+        (19.75, overload(19.25, 19.5), 0),
+        (10.0, overload(15.0, 15.5), 0),
+    ],
+)
+def test_s3_event_before_the_stop_or_long_before_the_start_excuses_nothing(
+    stop: float, event: InjectedFault | Condition, unknown: int
+) -> None:
+    states = engines((0.0, ON), (stop, OFF), (20.0, ON))
+    found = CHECKERS["S3"](history(**PRESENT, states=states, commands=[(0.0, TURN_ON)], faults=[event]))
+    assert [each.time for each in found.evidence] == [20.0] * (1 - unknown)
+    assert found.unknown == unknown
+
+
+def test_s3_start_without_a_sign_of_life_uses_its_command_up() -> None:
+    states = engines((0.0, OFF), (20.0, ON), (20.25, OFF), (20.5, ON))
+    found = CHECKERS["S3"](history(states=states, commands=[(20.0, TURN_ON)], heartbeats=[(20.25, True)]))
+    assert [each.time for each in found.evidence] == [20.0, 20.5]
+
+
 @pytest.mark.parametrize(("presence", "unknown"), [(19.0, 1), (20.0, 1), (20.5, 0), (18.0, 0)])
 def test_s3_a_new_switch_excuses_only_a_present_operator(presence: float, unknown: int) -> None:
     states = engines((0.0, OFF), (20.0, ON), (20.25, OFF))
@@ -463,6 +559,28 @@ def test_s4_names_wrong_speeds_and_positions() -> None:
         [Evidence(6.0, "speed -0.5"), Evidence(6.0, "no published values give (5.0, 0.0)")],
         2,
     )
+
+
+@pytest.mark.parametrize(
+    ("theta2", "right", "mirrored"),
+    [(0.0, (2.0, 0.0), (0.0, 0.0)), (math.pi / 2.0, (1.0, 1.0), (1.0, -1.0))],
+)
+def test_s4_mirrored_position_is_wrong(
+    theta2: float, right: tuple[float, float], mirrored: tuple[float, float]
+) -> None:
+    links = LINKS | {"theta2": [(0.0, theta2)]}
+    found = CHECKERS["S4"](history(**links, positions=[(5.0, right), (6.0, mirrored)]))
+    assert [each.time for each in found.evidence] == [6.0]
+
+
+@pytest.mark.parametrize(("l1", "l2"), [(1.0, 1e9), (1e9, 1.0)])
+def test_s4_position_is_rounded_as_its_longer_link(l1: float, l2: float) -> None:
+    values = [(l1, l2, 0.3 + step, 0.4 + 2.7 * step) for step in range(20)]
+    streams = ([(1.0 + n, each) for n, each in enumerate(joint)] for joint in zip(*values, strict=True))
+    links = dict(zip(LINKS, streams, strict=True))
+    positions = [(1.5 + n, forward_kinematics(*each)) for n, each in enumerate(values)]
+    found = CHECKERS["S4"](history(**links, positions=positions))
+    assert (found.cases, found.evidence) == (20, [])
 
 
 # S5
@@ -495,7 +613,7 @@ def test_s5_reports_of_a_second_process() -> None:
     health = [(at, ("velocity", pid)) for at, pid in reports]
     lives.append(Life(KINEMATICS, 20, 0.0, None))
     health += [(1.0, (KINEMATICS, 20)), (12.0, (KINEMATICS, 7))]  # a pid that velocity had before
-    faults = [overload(5.5, 5.625), overload(9.5, 9.625)]
+    faults = [overload(5.5, 5.625), overload(9.5, 9.625), overload(15.0, 15.5)]
     found = CHECKERS["S5"](history(health=health, lives=lives, faults=faults))
     together = [each for each in found.evidence if " while " in each.text]
     assert together == [
@@ -503,6 +621,28 @@ def test_s5_reports_of_a_second_process() -> None:
         Evidence(12.0, "process 7 runs kinematics while process 20 lives"),
     ]
     assert found.unknown == 2
+
+
+def test_s5_names_each_process_beside_a_third_one() -> None:
+    lives = [Life("velocity", pid, 0.0, None) for pid in (7, 8, 9)]
+    found = CHECKERS["S5"](history(health=[(pid, ("velocity", pid)) for pid in (7, 8, 9)], lives=lives))
+    beside = "process 9 runs velocity while process"
+    assert [each.text for each in found.evidence[1:]] == [f"{beside} 7 lives", f"{beside} 8 lives"]
+
+
+def test_s5_evidence_is_in_the_order_of_time() -> None:
+    supervisors = [Life("", pid, begin, None) for pid, begin in ((1, 0.0), (2, 5.0))]
+    lives = [*supervisors, *(Life("velocity", pid, 0.0, None) for pid in (7, 8))]
+    health = [(at, ("velocity", pid)) for at, pid in ((1.0, 7), (8.0, 8))]
+    found = CHECKERS["S5"](history(health=health, lives=lives))
+    assert [each.time for each in found.evidence] == [5.0, 8.0]
+
+
+def test_s5_services_of_two_hosts_may_have_one_name() -> None:
+    hosts = {7: "robot", 8: "operator"}
+    health = [(1.0 + pid, ("velocity", pid, (HOST, host))) for pid, host in hosts.items()]
+    lives = [Life("velocity", pid, 0.0, None) for pid in hosts]
+    assert not CHECKERS["S5"](history(health=health, lives=lives)).evidence
 
 
 # L1
@@ -558,6 +698,19 @@ def test_l1_slow_median_is_told_with_its_longest_silence() -> None:
     assert found.evidence == [Evidence(15.0, median, "after this kill, it was silent for 1.75 s")]
 
 
+def test_l1_two_kills_have_no_median() -> None:
+    found = CHECKERS["L1"](history(l1=back((5.0, 1.5), (15.0, 1.75)), faults=kill("config_l1", 5.0, 15.0)))
+    assert (found.cases, found.evidence) == (2, [])
+
+
+def test_l1_silence_is_told_with_the_start_of_the_next_process() -> None:
+    times = [(0.0, 10.0), (10.5, 11.0), (11.5, None)]
+    lives = [Life("config_l1", pid, *life) for pid, life in enumerate(times)]
+    judged = history(l1=back((10.0, 3.0)), lives=lives, faults=kill("config_l1", 10.0))
+    (found,) = CHECKERS["L1"](judged).evidence
+    assert found.cause == "its successor started after 0.50 s"
+
+
 @pytest.mark.parametrize(("end", "unknown"), [(11.25, 0), (11.5, 1)])
 def test_l1_pause_of_the_machine_slows_no_median(end: float, unknown: int) -> None:
     faults = [*kill("config_l1", 10.0), overload(11.0, end)]
@@ -596,6 +749,34 @@ def test_l1_silence_for_good_after_any_fault_is_evidence() -> None:
     ]
 
 
+def test_l1_silence_that_another_fault_makes_longer_is_explained() -> None:
+    faults = [stopped("config_l1", 10.0, 10.0, "terminate"), stopped("config_l1", 12.0, 25.0)]
+    assert not CHECKERS["L1"](history(l1=back((10.0, 17.0)), faults=faults)).evidence
+    assert CHECKERS["L1"](history(l1=back((10.0, 17.0)), faults=faults[:1])).evidence
+
+
+@pytest.mark.parametrize(("until", "found"), [(9.0, 0), (11.5, 0), (12.5, 1), (40.0, 1)])
+def test_l1_killed_velocity_need_not_return_while_the_arm_stands_still(until: float, found: int) -> None:
+    moved = [(at, (min(at, until), 0.0)) for at, _ in stream()]
+    speeds = [*steps(0, 9.75, value=0.5), (14.875, 0.0)]
+    judged = history(positions=moved, speeds=speeds, faults=[stopped("velocity", 10.0, 10.0, "kill")])
+    finding = CHECKERS["L1"](judged)
+    assert [each.text for each in finding.evidence] == ["velocity is silent for 5.00 s after SIGKILL"] * found
+    assert (finding.cases, finding.unknown) == (found, 1 - found)
+
+
+@pytest.mark.parametrize(("until", "found"), [(10.0, 0), (11.125, 0), (11.25, 1), (40.0, 1)])
+def test_l1_speed_stays_away_while_the_arm_stands_still(until: float, found: int) -> None:
+    moved = [(at, (min(at, until), 0.0)) for at, _ in stream()]
+    ended = stopped("velocity", 10.0, 10.0, "terminate")
+    health = steps(0, 40, 1.0, value=("velocity", 7))
+    judged = history(positions=moved, speeds=steps(0, 9.75, value=0.5), health=health, faults=[ended])
+    text = "velocity is silent for 10 s after terminate"
+    assert CHECKERS["L1"](judged).evidence == [Evidence(20.0, text)] * found
+    judged.streams["effector/position"] = []  # nobody knows whether it stands
+    assert CHECKERS["L1"](judged).evidence == [Evidence(20.0, text)]
+
+
 @pytest.mark.parametrize(
     ("ended", "time"),
     [
@@ -612,6 +793,43 @@ def test_l1_silence_for_good_after_any_fault_is_evidence() -> None:
 def test_l1_silence_begins_with_the_death(ended: Life, time: float) -> None:
     faults = [InjectedFault("kill", "config_l1", 10.0, 10.0, 5)]
     assert CHECKERS["L1"](history(l1=back((10.0, 1.5)), lives=[ended], faults=faults)).worst == time
+
+
+KILLED_LATE = {
+    "lives": [Life("config_l1", 5, 0.0, 11.0)],
+    "faults": [InjectedFault("kill", "config_l1", 10.0, 10.0, 5)],
+}
+"""On a busy machine, the process dies one second after the kill."""
+
+
+def test_l1_message_that_overtakes_another_one_ends_the_silence() -> None:
+    judged = history(l1=back((10.0, 1.125)), faults=kill("config_l1", 10.0))
+    judged.streams["l1"] = [s._replace(received=13.0) if s.sent == 11.0 else s for s in judged.streams["l1"]]
+    assert CHECKERS["L1"](judged).worst == 1.375
+
+
+@pytest.mark.parametrize(
+    ("event", "unknown"),
+    [
+        (overload(10.25, 10.75), 0),  # before the death
+        (overload(13.0, 13.5), 1),
+        (stopped("config_l1", 12.75, 12.75, "terminate"), 1),
+        (stopped("config_l1", 13.25, 13.25, "terminate"), 0),
+    ],
+)
+def test_l1_only_an_event_between_the_death_and_the_return_excuses_a_silence(
+    event: InjectedFault | Condition, unknown: int
+) -> None:
+    judged = histories.faulty(history(l1=back((10.0, 3.5)), **KILLED_LATE), event)
+    found = CHECKERS["L1"](judged)
+    assert (len(found.evidence), found.unknown) == (1 - unknown, unknown)
+
+
+def test_l1_message_of_a_process_that_ends_soon_is_no_return() -> None:
+    ended = InjectedFault("terminate", "config_l1", 10.0, 10.0, 5)
+    lives = [Life("config_l1", 5, 0.0, 10.5)]
+    found = CHECKERS["L1"](history(l1=steps(0, 10.5, value=0.0), lives=lives, faults=[ended]))
+    assert found.evidence == [Evidence(20.5, "config_l1 is silent for 10 s after terminate")]
 
 
 @pytest.mark.parametrize(
@@ -633,6 +851,12 @@ def test_l1_other_fault_that_disturbs_the_return(other: InjectedFault, unknown: 
     assert (found.cases, found.unknown) == (1 - unknown, unknown)
 
 
+def test_l1_fault_after_the_return_was_due_excuses_nothing() -> None:
+    faults = [*kill("config_l1", 10.0), stopped("config_l1", 12.5, 12.5, "terminate")]
+    found = CHECKERS["L1"](history(l1=back((10.0, 3.0)), faults=faults))
+    assert (len(found.evidence), found.unknown) == (1, 0)
+
+
 def test_l1_fault_of_a_needed_program_disturbs_the_return() -> None:
     faults = [*kill("velocity", 10.0), stopped(KINEMATICS, 10.0, 10.0, "terminate")]
     assert CHECKERS["L1"](history(speeds=back((10.0, 1.5)), faults=faults)).unknown == 1
@@ -641,6 +865,17 @@ def test_l1_fault_of_a_needed_program_disturbs_the_return() -> None:
 def test_l1_dead_source_does_not_excuse_a_program_that_starts_without_it() -> None:
     found = CHECKERS["L1"](history(speeds=back((10.0, 3.0)), faults=kill("velocity", 10.0)))
     assert (len(found.evidence), found.unknown) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("silent", "length", "unknown"), [(8.5, 2.0, 1), (11.0, 2.0, 1), (10.0, 2.0, 0), (12.0, 2.0, 0)]
+)
+def test_l1_source_that_is_away_at_the_kill_or_when_the_return_is_due_excuses_it(
+    silent: float, length: float, unknown: int
+) -> None:
+    sources = {name: back() for name in LINKS} | {"l2": back((silent, length))}
+    found = CHECKERS["L1"](history(**sources, positions=back((10.0, 3.0)), faults=kill(KINEMATICS, 10.0)))
+    assert (len(found.evidence), found.unknown) == (1 - unknown, unknown)
 
 
 @pytest.mark.parametrize(("last", "unknown"), [(8.75, 1), (8.875, 0), (10.0, 0)])
@@ -669,6 +904,7 @@ def test_l2_longest_gap_is_that_of_the_other_streams() -> None:
             l2=stream((5.0, 1.125)),  # before the kills
             theta1=stream((9.875, 0.375)),
             theta2=stream((10.0, 0.5)),
+            states=stream((9.25, 1.125)),  # silent before the kill
             faults=kill("config_theta2", 10.0),
         )
     )
@@ -698,6 +934,20 @@ def test_l2_gap_within_the_restart_is_evidence_unless_the_observer_missed_it() -
     )
 
 
+@pytest.mark.parametrize("killed", [stream((10.0, 5.0)), []])
+@pytest.mark.parametrize(("silent", "found"), [(11.5, 1), (12.5, 0)])
+def test_l2_judges_two_seconds_of_a_restart_at_most(
+    killed: list[tuple[float, float]], silent: float, found: int
+) -> None:
+    judged = history(l1=killed, l2=stream((silent, 0.625)), faults=kill("config_l1", 10.0))
+    assert len(CHECKERS["L2"](judged).evidence) == found
+
+
+def test_l2_judges_a_restart_until_the_return() -> None:
+    judged = history(l1=stream((10.0, 2.5)), l2=stream((11.75, 0.625)), **KILLED_LATE)
+    assert [each.time for each in CHECKERS["L2"](judged).evidence] == [11.75]
+
+
 @pytest.mark.parametrize(
     ("other", "cases"),
     [
@@ -717,11 +967,9 @@ def test_l2_stream_that_another_fault_disturbs_is_no_case(other: InjectedFault, 
     assert CHECKERS["L2"](history(**messages, faults=[*kill("config_l1", 10.0), other])).cases == cases
 
 
-@pytest.mark.parametrize(("program", "gaps"), [("robot_state", 0), ("config_l2", 1)])
-def test_l2_state_of_the_robot_waits_for_its_values_after_a_step_of_the_clock(
-    program: str, gaps: int
-) -> None:
-    topic = {"robot_state": "joint_states", "config_l2": "l2"}[program]
+@pytest.mark.parametrize(("program", "gaps"), [("robot_state", 0), ("velocity", 0), ("config_l2", 1)])
+def test_l2_state_and_speed_wait_for_values_after_a_step_of_the_clock(program: str, gaps: int) -> None:
+    topic = {"robot_state": "joint_states", "velocity": "speeds", "config_l2": "l2"}[program]
     faults = [*kill("config_l1", 10.0), InjectedFault(STEP, NO_TARGET, 10.0, 10.0)]
     found = CHECKERS["L2"](history(**{"l1": stream((10.0, 0.5)), topic: stream((10.0, 0.5))}, faults=faults))
     assert [program in each.text for each in found.evidence] == [True] * gaps
@@ -809,10 +1057,43 @@ def test_l3_disturbed_return_is_no_case(at: float, cases: int) -> None:
     assert CHECKERS["L3"](history(**LINKS, positions=positions(), faults=faults)).cases == cases
 
 
+def test_l3_position_has_to_be_right_half_a_second_after_the_return() -> None:
+    killed = InjectedFault("kill", KINEMATICS, 4.0, 4.0, 5)
+    judged = history(
+        **LINKS,
+        positions=[each for each in positions(6.0) if not 4.5 < each[0] < 5.5],
+        lives=[Life(KINEMATICS, 5, 0.0, 5.0)],
+        faults=[killed],
+    )
+    found = CHECKERS["L3"](judged)
+    assert (found.cases, found.evidence) == (1, [])
+
+
 @pytest.mark.parametrize(("kind", "cases"), [("terminate", 1), ("raise", 1), ("stop", 1), ("double", 0)])
 def test_l3_kinds_of_faults(kind: str, cases: int) -> None:
-    faults = [stopped(KINEMATICS, 4.0, 4.0, kind)]
-    assert CHECKERS["L3"](history(**LINKS, positions=positions(), faults=faults)).cases == cases
+    faults = [stopped(KINEMATICS, 4.0, 9.0, kind)]
+    found = CHECKERS["L3"](history(**LINKS, positions=positions(6.0), faults=faults))
+    assert (found.cases, len(found.evidence)) == (cases, cases)
+
+
+@pytest.mark.parametrize("kind", ["stop", "pause", "hang", "hog", "slow"])
+def test_l3_message_that_was_under_way_is_no_return(kind: str) -> None:
+    heard = [at for at, _ in steps(0, 40) if not 4.25 < at < 5.5]
+    judged = history(
+        **LINKS,
+        positions=[(at, (5.0, 0.0) if at == 5.75 else (2.0, 0.0)) for at in heard],
+        lives=[Life(KINEMATICS, 7, 0.0, 5.5 if kind == "hang" else None)],
+        faults=[InjectedFault(kind, KINEMATICS, 4.0, 5.5, 7)],
+    )
+    found = CHECKERS["L3"](judged)
+    assert (found.cases, found.evidence) == (1, [])
+
+
+@pytest.mark.parametrize(("at", "cases"), [(5.5, 0), (6.25, 1)])
+def test_l3_return_of_a_source_is_no_case_while_kinematics_is_away(at: float, cases: int) -> None:
+    links = LINKS | {"l1": [(sent, 1.0) for sent, _ in back((4.0, 0.625))]}
+    faults = [*kill("config_l1", 4.0), stopped(KINEMATICS, at, at, "double")]
+    assert CHECKERS["L3"](history(**links, positions=positions(), faults=faults)).cases == cases
 
 
 # L4
@@ -823,6 +1104,7 @@ def test_l4_counts_hangs_that_last() -> None:
         history(
             l1=back((10.0, 5.0)),
             l2=back((10.0, 5.5)),
+            health=[(16.0, ("sentinel", 7))],  # too late
             faults=[
                 stopped("config_l1", 2.0, 4.0),  # too short
                 stopped(OPERATOR, 3.0, 9.0),
@@ -843,6 +1125,12 @@ def test_l4_counts_hangs_that_last() -> None:
         {"config_l1": [5.0], "config_l2": [5.5]},
         5.5,
     )
+
+
+def test_l4_hang_begins_with_the_fault_and_not_with_the_death() -> None:
+    lives = [Life("config_l1", 7, 0.0, 10.5), Life("config_l1", 8, 10.5, None)]
+    faults = [InjectedFault("stop", "config_l1", 10.0, 20.0, 7)]
+    assert CHECKERS["L4"](history(l1=back((10.0, 1.5)), lives=lives, faults=faults)).worst == 1.5
 
 
 @pytest.mark.parametrize(("end", "unknown"), [(11.375, 0), (11.5, 1), (12.0, 1)])

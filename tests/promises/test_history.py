@@ -30,6 +30,7 @@ from tests.promises.history import (
     gaps,
     merged,
     programs_of_manifest,
+    running,
     target_name,
 )
 from tests.promises.liveness import STREAMS
@@ -133,10 +134,13 @@ def test_merged_intervals_that_touch_stay_apart() -> None:
         ("partition", "velocity", 5, 4.0),
         ("stop", "velocity", 6, 4.0),
         ("stop", "velocity", 7, 4.0),
+        ("hang", "velocity", 6, 10.0),
+        ("hang", "velocity", 7, 9.0),
+        ("hang", "kinematics", 5, 4.0),
         ("stop", "kinematics", 5, 4.0),
     ],
 )
-def test_suspension_matters_until_its_process_ends(kind: str, target: str, pid: int, end: float) -> None:
+def test_suspension_matters_until_its_process_is_gone(kind: str, target: str, pid: int, end: float) -> None:
     lives = [
         Life("velocity", 5, 0.0, 3.0),
         Life("velocity", 6, 0.0, None),
@@ -158,6 +162,34 @@ def test_lives_of_a_program_are_those_without_an_older_one_that_lasts() -> None:
     ]
     history = History(10.0, lives=lives)
     assert [life.pid for life in history.lives_of("velocity")] == [1, 3, 4, 7]
+
+
+def test_stop_may_last_beyond_the_end_of_the_record() -> None:
+    history = History(3.0, lives=[Life("velocity", 6, 0.0, None)])
+    assert history.effect_end(InjectedFault("stop", "velocity", 2.0, 4.0, 6)) == 4.0
+
+
+def test_last_report_of_a_parameter_counts() -> None:
+    reports = [("velocity", 5, ("rate", 1.0), ("window", 3)), ("velocity", 6, ("rate", 2.0)), ("drive", 7)]
+    health = [Sample(float(at), float(at), report) for at, report in enumerate(reports)]
+    parameters = History(9.0, {"/diagnostics": health}).parameters
+    assert parameters == {"velocity": {"rate": 2.0, "window": 3}, "drive": {}}
+
+
+@pytest.mark.parametrize(("driven", "lacked"), [([], {DRIVE, "velocity"}), ([1.0], {"velocity"})])
+def test_arm_lacks_the_programs_of_another_host_and_an_idle_drive(
+    driven: list[float], lacked: set[str]
+) -> None:
+    times = [Sample(at, at, (at, "host")) for at in driven]
+    history = History(9.0, {"driven_time": times}, programs=(DRIVE, "kinematics"))
+    assert {each for each in (DRIVE, "kinematics", "velocity") if history.lacks(each)} == lacked
+
+
+def test_engines_run_until_the_next_state_or_the_timeout_of_the_drive() -> None:
+    states = [(1.0, "on"), (1.25, "on"), (1.5, "off"), (3.0, "on"), (5.0, "off"), (8.75, "on")]
+    stream = [Sample(at, at, state) for at, state in states]
+    runs = [(1.0, 1.25), (1.25, 1.5), (3.0, 3.4), (8.75, 9.0)]
+    assert [*running(History(9.0, {"engines/state": stream}))] == runs
 
 
 def test_output_of_a_program_without_one_is_its_health() -> None:

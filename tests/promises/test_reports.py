@@ -76,6 +76,19 @@ def test_head_names_the_overloads_and_the_verdicts_that_they_weaken() -> None:
         assert overloads(overloaded, findings) == head
 
 
+def test_overload_that_leaves_an_outcome_unknown_weakens_the_verdict() -> None:
+    history = faulty(killed(good(), "velocity", 20.0, 1.5), Condition("overload", 20.75, 21.5))
+    assert overloads(history, [*checked(history)]).endswith(" 0.8 s in all; weakened verdicts: L1")
+
+
+def test_loss_is_no_overload() -> None:
+    history = killed(good(), "kinematics", 20.0, 2.4)
+    history = faulty(history, Condition("loss", 21.0, 21.5), Condition("overload", 50.0, 50.5))
+    assert overloads(history, [*checked(history)]) == (
+        "1 overload of the machine or the observer, 0.5 s in all; weakened verdicts: none"
+    )
+
+
 def test_durations_have_a_title_and_percentiles() -> None:
     back = killed(good(), "kinematics", 20.0, 0.6)
     hang = faulty(
@@ -133,6 +146,7 @@ def test_report_on_a_hang_names_who_did_not_act() -> None:
             succeeded(hung, "config_l2", 23.0),
             f"{hang}: it was killed after 3.00 s, but its successor was silent",
         ),
+        (succeeded(hung, "config_l2", 26.0), "sentinel lived, but did not replace config_l2"),
     ):
         found = [CHECKERS["L4"](history)]
         for report in (text(found), html("title", [], found, history)):
