@@ -22,6 +22,8 @@ collect_ignore: list[str] = []
 settings.register_profile("reactive-arm", deadline=None)  # a busy machine is no defect
 # For `make mutants`: whether a test fails, not the smallest example; the same examples each time.
 settings.register_profile("mutants", deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
+# For `.ci/run`: once more on another Python or middleware. The main run has tried more examples.
+settings.register_profile("again", deadline=None, max_examples=10)
 settings.load_profile("reactive-arm")
 
 MARK = "REACTIVE_ARM_TESTS"
