@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +23,8 @@ from reactive_node.domains import reserved_domain
 from tests.environment import user_environment
 from tests.system.sites import LIMIT, Site
 
+ATTEMPTS = 3.0  # s for which a stranger tries
+HEARTBEAT, ENGINES, STATE = "operator_heartbeat", "engines", "engines/state"
 PROGRAMS = [program.name for program in manifest.programs(manifest.PATH)]
 
 
@@ -90,6 +93,43 @@ def peers(site: Site) -> Iterator[MakePeer]:
             return stack.enter_context(closing(Peer(node, given, *arguments))).joined()
 
         yield make
+
+
+@pytest.fixture
+def watcher(make_peer: MakePeer) -> Peer:
+    """A peer with the recorder's keys that hears the state of the engines."""
+    return watching(make_peer)
+
+
+@pytest.fixture
+def open_watcher(make_open_peer: MakePeer) -> Peer:
+    """A peer that hears the state of the engines of the arm without keys."""
+    return watching(make_open_peer)
+
+
+def watching(make_peer: MakePeer) -> Peer:
+    watcher = make_peer("recorder_1", "recorder")
+    watcher("read", STATE)
+    until(lambda: "off" in watcher("heard", STATE))
+    return watcher
+
+
+def hold_switch_and_turn_on(peer: Peer, watcher: Peer, seconds: float = ATTEMPTS) -> list[str]:
+    """Send heartbeats and `turn_on`; return the states of the engines meanwhile."""
+    for name in (HEARTBEAT, ENGINES):
+        peer("advertise", name)
+    states: list[str] = []
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline and "on" not in states:
+        peer("publish", HEARTBEAT, True)
+        peer("publish", ENGINES, "turn_on")
+        states += watcher("heard", STATE)
+        time.sleep(0.05)
+    return states
+
+
+def permissions(keystore: Keystore, enclave: str) -> Path:
+    return keystore.folder / "enclaves" / enclave / "permissions.p7s"
 
 
 def until(condition: Callable[[], object], seconds: float = LIMIT) -> None:
