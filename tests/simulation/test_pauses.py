@@ -14,7 +14,7 @@ import reactivex as rx
 from geometry_msgs.msg import Twist, Vector3
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
-from rclpy_simulation import Network, Process, Simulation
+from rclpy_simulation import Delay, Network, Process, Simulation
 from std_msgs.msg import Header, String
 
 from interfaces import topics
@@ -175,3 +175,20 @@ def test_timer_of_a_node_that_pauses_is_not_late_afterwards(simulation: Simulati
     assert len(pauses.ends) > STEPS
     times = [at - pauses.sent[0][0] for at, _ in pauses.sent]
     assert times == pytest.approx([n * PERIOD for n in range(len(times))], abs=0.001)
+
+
+def test_node_that_pauses_inside_a_recipe_holds_up_no_recipe_of_others(simulation: Simulation) -> None:
+    """RxPY keeps in a ``threading.local`` whether it runs something on this thread."""
+    heard: list[float] = []
+
+    def stand() -> None:
+        rx.of(1).subscribe(lambda _: time.sleep(3.0))
+
+    def go() -> None:
+        time.sleep(1.0)
+        rx.of(1).subscribe(lambda _: heard.append(simulation.now))
+
+    for program in (stand, go):
+        simulation.start(program, delay=Delay(0.0, 0.0))
+    simulation.run(5.0)
+    assert heard == pytest.approx([1.0], abs=0.001)

@@ -29,6 +29,16 @@ from rclpy_simulation import Delay, Process, Simulation
 NOW = Delay(0.0, 0.0)
 
 
+class OfThread(threading.local):
+    """Values of a thread, as a library keeps them in a module."""
+
+    def __init__(self) -> None:
+        self.values: list[str] = []
+
+
+OF_THREAD = OfThread()
+
+
 def run(simulation: Simulation, program: Callable[[], Any]) -> Process:
     process = simulation.start(program, name="program", delay=NOW)
     simulation.run_until(lambda: process.ended, 7200.0)
@@ -164,6 +174,27 @@ def test_each_thread_has_its_own_identity(simulation: Simulation) -> None:
     assert names == ["MainThread", "other"] * 2
     assert len(identities) == 4
     assert not identities & threading._active.keys()  # type: ignore[attr-defined]
+
+
+def test_each_thread_has_its_own_local_values(simulation: Simulation) -> None:
+    seen: list[list[str]] = []
+
+    def note(name: str) -> None:
+        OF_THREAD.values.append(name)
+        time.sleep(1.0)
+        seen.append(OF_THREAD.values)
+
+    def program() -> None:
+        other = threading.Thread(target=note, args=["other"])
+        other.start()
+        note("main")
+        other.join()
+
+    OF_THREAD.values.append("test")
+    first, second = (simulation.start(program, delay=NOW) for _ in range(2))
+    simulation.run_until(lambda: first.ended and second.ended)
+    assert seen == [["main"], ["main"], ["other"], ["other"]]
+    assert OF_THREAD.values.pop() == "test"
 
 
 def test_a_real_thread_keeps_its_identity_and_its_time(simulation: Simulation) -> None:

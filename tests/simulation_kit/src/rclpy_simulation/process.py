@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from _thread import _local
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures.thread import _threads_queues
@@ -346,7 +347,7 @@ class Process:
         self.handle_interrupts(thread)
 
 
-class _Here(threading.local):
+class _Here(_local):
     """What runs now in the real thread of the simulation; other real threads run nothing simulated."""
 
     process: Process | None = None
