@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from deploy.supervision import parameter_file
+from deploy.supervision import interruption, parameter_file
 from deploy.supervision.manifest import PAGE
 from interfaces.service import UserError
 from interfaces.service.parameters import Declaration
@@ -70,6 +70,7 @@ def _value(rng: random.Random, declaration: Declaration) -> Any:
 
 def main(arguments: Sequence[str]) -> int:
     """Print the violations, and how many settings had some; return the exit code."""
+    interruption.install()
     parser = argparse.ArgumentParser(prog="python -m tests.simulation.settings", description=__doc__)
     parser.add_argument("number", type=int)
     parser.add_argument("minutes", type=float)
@@ -77,6 +78,14 @@ def main(arguments: Sequence[str]) -> int:
     given = parser.parse_args(arguments)
     print(f"Seed {given.seed}", flush=True)
     experiments = [experiment(f"{given.seed} {n}", 60.0 * given.minutes) for n in range(given.number)]
+    try:
+        return _judge(experiments)
+    except interruption.Interrupted:
+        print("Interrupted.")
+        return 130
+
+
+def _judge(experiments: Sequence[Experiment]) -> int:
     bad = 0
     for number, (each, summary) in enumerate(zip(experiments, summaries(experiments), strict=True), start=1):
         found = [(finding.promise, it) for finding in summary.total() for it in finding.evidence]
@@ -87,7 +96,7 @@ def main(arguments: Sequence[str]) -> int:
                 *(f"  {promise} {it.time:.2f} s: {it.words}" for promise, it in found),
                 sep="\n",
             )
-        print(f"{number} of {given.number}: {bad} with a violation", flush=True)
+        print(f"{number} of {len(experiments)}: {bad} with a violation", flush=True)
     return int(bool(bad))
 
 
