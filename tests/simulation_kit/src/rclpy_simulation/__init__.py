@@ -8,7 +8,7 @@ if find_spec("greenlet") is None:
     raise ImportError("rclpy_simulation needs greenlet: pip install 'greenlet>=3.1,<4'")
 
 # Before a library derives from it: in the one in C, all simulated threads share the values of the real one.
-threading.local = local  # type: ignore[misc]
+threading.local = local  # type: ignore[assignment]
 
 import rclpy_ground  # noqa: E402
 from rclpy_simulation.ground import GROUND  # noqa: E402
