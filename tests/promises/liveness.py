@@ -7,6 +7,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 
+from deploy.supervision.policy import Timeouts
 from interfaces import topics
 from services import robot_state
 from tests.promises import claims
@@ -87,7 +88,7 @@ def _kills(history: History) -> Iterator[InjectedFault]:
 def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evidence]:
     """Yield programs without output after a fault of any kind, unless another fault explains it."""
     for fault in history.faults:
-        begin = max(fault.end, _death(history, fault))
+        begin = max(fault.end, _death(history, fault), _start_limit(history, fault))
         end = begin + GONE
         if end > history.end:
             continue
@@ -110,6 +111,16 @@ def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evid
                 continue
             if undisturbed(found, program, begin, end, Reason.SILENT, but=fault):
                 yield Evidence(end, f"{program} is silent for {GONE:g} s after {fault.kind}")
+
+
+def _start_limit(history: History, fault: InjectedFault) -> float:
+    """Return until when the sentinel lets a process start that hangs before its first sign of life [s]."""
+    for life in history.lives_of(fault.target) if fault.kind == "hang" else ():
+        signs = (*history.output(fault.target), *history.health(fault.target))
+        if life.pid == fault.pid and not any(life.began <= sign.sent <= fault.begin for sign in signs):
+            timeout = history.parameters.get(SENTINEL, {}).get("start_timeout", Timeouts.start)
+            return life.began + float(timeout)
+    return fault.begin
 
 
 def other_streams_flow(history: History, found: Sequence[Effect]) -> Finding:

@@ -312,6 +312,30 @@ def test_l1_program_that_stays_away_after_the_sources_are_back_is_found(
     assert texts == [f"{program} is silent for 10 s after kill_all"] * found
 
 
+@pytest.mark.parametrize(
+    ("start_timeout", "kind", "heard", "found"),
+    [
+        ({"start_timeout": 31.0}, "hang", 19.9, False),
+        ({"start_timeout": 12.0}, "hang", 19.9, True),
+        ({}, "hang", 19.9, True),
+        ({"start_timeout": 31.0}, "hang", 20.3, True),  # after its first sign of life
+        ({"start_timeout": 31.0}, "stop", 19.9, True),  # that ends by itself
+    ],
+)
+def test_l1_program_that_hangs_while_it_starts_has_time_until_the_sentinel_kills_it(
+    start_timeout: dict[str, float], kind: str, heard: float, found: bool
+) -> None:
+    lives = [life._replace(ended=20.0) if life.program == "velocity" else life for life in good().lives]
+    history = replace(good(), lives=[*lives, Life("velocity", 7, 20.0, None)])
+    history = faulty(history, InjectedFault(kind, "velocity", 20.4, 24.4, 7))
+    history = silent(history, "effector/speed", heard, END)
+    reports = [each for each in history.stream(topics.DIAGNOSTICS) if each.value[0] != "velocity"]
+    reports.append(Sample(1.0, 1.0, ("sentinel", 5, *start_timeout.items())))
+    history = replace(history, streams={**history.streams, "/diagnostics": reports})
+    texts = [each.text for each in CHECKERS["L1"](history).evidence]
+    assert texts == [f"velocity is silent for 10 s after {kind}"] * found
+
+
 @pytest.mark.parametrize("kind", ["flood", "babble"])
 def test_l1_injected_heartbeats_are_not_output_of_the_switch(kind: str) -> None:
     history = killed(good(), "dead_mans_switch", 20.0, 99.0)
