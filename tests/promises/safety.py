@@ -42,6 +42,7 @@ from tests.promises.history import (
     merged,
     running,
 )
+from tests.promises.lateness import MATCHED
 from tests.promises.positions import PublishedValues, may_lack_values
 
 LETTING_GO = 1.0  # s from the operator's release until no heartbeat may come
@@ -343,8 +344,12 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
         (max(effect.begin - given.reading, begin), min(effect.end, time))
         for effect in disturbing(found, WATCHDOG, begin, time, Reason.DEAF)
     ]
+    # On a bad line, and of a new switch, it may miss heartbeats that the observer hears.
+    missed = [(each.begin, each.end) for each in disturbing(found, ALL, begin, time, Reason.DELAYED)]
+    missed += [(life.began, life.began + MATCHED) for life in history.lives_of(SWITCH) if life.began > begin]
+    sent = (each.sent for each in between(signs, begin, time))
+    heartbeats = (at for at in sent if not any(start < at < end for start, end in missed))
     # Intervals that only touch have a heartbeat in between.
-    heartbeats = (each.sent for each in between(signs, begin, time))
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
     return sum((end - begin + given.sampling) // given.silence for begin, end in silences)
 

@@ -426,6 +426,11 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
             COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_presence", 14.0, 15.0, HOLD)]},
             False,
         ),
+        # what a bad line or a new switch sends, the watchdog may miss
+        (COMMANDED | {"heartbeats": SHORT, "faults": [bad_line(14.0, 15.0)]}, True),
+        (COMMANDED | {"heartbeats": SHORT, "faults": [bad_line(14.5, 15.5)]}, False),
+        (COMMANDED | {"heartbeats": SHORT, "lives": two_lives(SWITCH, 13.0)}, True),
+        (COMMANDED | {"heartbeats": SHORT, "lives": two_lives(SWITCH, 12.25)}, False),
         # no presence for ten seconds, for a reason
         (UNSEEN, False),
         (UNSEEN | {"heartbeats": steps(0, 40, 1.0)}, False),
