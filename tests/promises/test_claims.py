@@ -291,6 +291,8 @@ def test_strikes_after_the_last_command_count(commands: tuple[float, ...], found
         (InjectedFault("kill", "velocity", 20.0, 20.0), 19.0, True),
         (InjectedFault("stop", "velocity", 10.0, 20.0), 44.0, False),
         (InjectedFault("stop", "velocity", 10.0, 20.0), 46.0, True),
+        (InjectedFault("hang", "velocity", 10.0, 20.0, 7), 50.0, False),  # it hangs until it ends
+        (InjectedFault("hang", "velocity", 10.0, 20.0, 9), 50.0, True),
         (InjectedFault("kill", "velocity", 20.0, 20.0), 50.0, True),
         (InjectedFault("kill", "kinematics", 20.0, 20.0), 20.1, True),
         (InjectedFault("kill_all", "all", 20.0, 20.0), 20.1, False),
