@@ -277,11 +277,15 @@ def _was_away(found: Sequence[Effect], on: Sample, off: Sample) -> bool:
 
 
 def _was_interrupted(history: History, found: Sequence[Effect], on: Sample) -> bool:
-    """Return whether a suspension interrupted the sending of an `on`; an `off` follows it at once then."""
+    """Return whether a suspension interrupted the sending of an `on`.
+
+    An `off` follows it at once, unless the suspension was too short for the controller to notice.
+    """
     states = between(history.stream(topics.ENGINES_STATE), on.sent, on.sent + SAME)
-    just_before = disturbing(found, CONTROLLER, on.sent - SAME, on.sent, Reason.SUSPENDED)
-    return any(state.value == OFF for state in states) and any(
-        effect.end <= on.sent + SAME for effect in just_before
+    is_off = any(state.value == OFF for state in states)
+    return any(
+        effect.end <= on.sent + SAME and (is_off or effect.end - effect.begin < DRIVE_TIMEOUT)
+        for effect in disturbing(found, CONTROLLER, on.sent - SAME, on.sent, Reason.SUSPENDED)
     )
 
 

@@ -259,6 +259,15 @@ def test_s2_and_s3_allow_an_on_that_a_suspension_interrupts(
     assert [each.time for each in CHECKERS["S3"](arm).evidence] == [14.0] * is_blamed
 
 
+@pytest.mark.parametrize(("stop", "is_blamed"), [(9.5, True), (9.625, False), (9.875, False)])
+def test_s3_allows_an_on_that_a_suspension_too_short_to_notice_delays(stop: float, is_blamed: bool) -> None:
+    states = [*steps(0, 9.5, 0.125, ON), *steps(10.0, 40, 0.125, ON)]
+    arm = history(
+        **PRESENT, states=states, commands=[(0.0, TURN_ON)], faults=[stopped(CONTROLLER, stop, 10.0)]
+    )
+    assert [each.time for each in CHECKERS["S3"](arm).evidence] == [10.0] * is_blamed
+
+
 def test_s2_counts_kills_while_engines_are_on_and_the_operator_is_present() -> None:
     lives = [
         Life(CONTROLLER, 1, 0.0, 9.875),
