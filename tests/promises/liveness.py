@@ -116,8 +116,7 @@ def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evid
 def _start_limit(history: History, fault: InjectedFault) -> float:
     """Return until when the sentinel lets a process start that hangs before its first sign of life [s]."""
     for life in history.lives_of(fault.target) if fault.kind == "hang" else ():
-        signs = (*history.output(fault.target), *history.health(fault.target))
-        if life.pid == fault.pid and not any(life.began <= sign.sent <= fault.begin for sign in signs):
+        if life.pid == fault.pid and not between(history.health(fault.target), life.began, fault.begin):
             timeout = history.parameters.get(SENTINEL, {}).get("start_timeout", Timeouts.start)
             return life.began + float(timeout)
     return fault.begin
