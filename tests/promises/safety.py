@@ -355,7 +355,17 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     heartbeats = (at for at in sent if not any(start < at < end for start, end in missed))
     # Intervals that only touch have a heartbeat in between.
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
-    return sum((end - begin + given.sampling) // given.silence for begin, end in silences)
+    return sum(
+        (end - begin + given.sampling + _delay(history, end)) // given.silence for begin, end in silences
+    )
+
+
+def _delay(history: History, time: float) -> float:
+    """Return by how much other heartbeats may delay the operator's at a time [s]."""
+    is_flooded = any(
+        each.kind in ("flood", "babble") and each.begin < time < each.end for each in history.faults
+    )
+    return BAD_TRANSPORT if is_flooded else 0.0
 
 
 def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:

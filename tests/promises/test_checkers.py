@@ -330,7 +330,9 @@ def test_l1_program_that_hangs_while_it_starts_has_time_until_the_sentinel_kills
     history = faulty(history, InjectedFault(kind, "velocity", 20.4, 24.4, 7))
     history = silent(history, "effector/speed", heard, END)
     reports = [
-        each for each in history.stream(topics.DIAGNOSTICS) if each.value[0] != "velocity" or each.sent < heard
+        each
+        for each in history.stream(topics.DIAGNOSTICS)
+        if each.value[0] != "velocity" or each.sent < heard
     ]
     reports.append(Sample(1.0, 1.0, ("sentinel", 5, *start_timeout.items())))
     history = replace(history, streams={**history.streams, "/diagnostics": reports})

@@ -314,6 +314,7 @@ AFTER_A_PAUSE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if
 UNSEEN = {"presences": steps(0, 10), "heartbeats": steps(0, 40)}
 FIRST_UNSEEN = 20.0 - 10.0 + 0.1 + TRANSPORT
 SHORT = heard_but_in(*SILENCES[:2], (12.0, 14.25))  # the last silence lacks 0.75 s of a strike
+SHORTER = heard_but_in(*SILENCES[:2], (12.0, 13.75))
 OFF_AT_14_5 = engines((0.0, ON), (14.5, OFF))  # the third strike is counted at this time
 COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCES)}
 
@@ -439,6 +440,10 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (COMMANDED | {"heartbeats": SHORT, "faults": [bad_line(14.0, 15.0)]}, True),
         (COMMANDED | {"heartbeats": SHORT, "faults": [bad_line(14.5, 15.5)]}, False),
         (COMMANDED | {"heartbeats": SHORT, "lives": two_lives(SWITCH, 13.0)}, True),
+        # a flood delays heartbeats by 0.6 s at most
+        (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.0, 16.0, "flood")]}, True),
+        (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.75, 16.0, "babble")]}, False),
+        (COMMANDED | {"heartbeats": SHORTER, "faults": [stopped(NO_TARGET, 13.0, 16.0, "flood")]}, False),
         (COMMANDED | {"heartbeats": SHORT, "lives": two_lives(SWITCH, 12.25)}, False),
         # no presence for ten seconds, for a reason
         (UNSEEN, False),
