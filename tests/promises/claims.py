@@ -182,9 +182,10 @@ def ends_have_causes(history: History, found: Sequence[Effect]) -> Iterator[Evid
 
 def _has_cause(history: History, found: Sequence[Effect], life: Life, ended: float) -> bool:
     for fault in history.faults:
-        concerns = fault.target in (life.program, ALL, NO_TARGET, OPERATOR)
+        if fault.target not in (life.program, ALL, NO_TARGET, OPERATOR):
+            continue
         until = max(fault.end, history.effect_end(fault))  # a hang ends with its process
-        if concerns and fault.begin - SAME <= ended <= until + REPLACING:
+        if fault.begin - SAME <= ended <= until + REPLACING:
             return True
     if not undisturbed(found, ALL, ended - KILLING, ended, *MISSED):
         return True

@@ -105,7 +105,7 @@ def _of_faults(history: History) -> Iterator[Effect]:
         recovery = HUNG if kind in LASTING else REDISCOVERY if kind == names.PARTITION else SLOWEST
         silent = (target, *names.DEPENDENTS.get(target, ()))
         yield Effect(silent, _from(begin), _to(replaced + recovery), Reason.SILENT, fault)
-        if kind in ("flood", "babble"):
+        if kind in names.FLOODS:
             silent = (SWITCH, *names.DEPENDENTS[SWITCH])
             yield Effect(silent, _from(begin), _to(end + recovery), Reason.SILENT, fault)
         if kind in names.SUSPENDING:
@@ -142,7 +142,7 @@ def _of_faults(history: History) -> Iterator[Effect]:
         if kind == names.BAD_LINE:
             yield Effect((ALL,), begin, end, Reason.DELAYED, fault)
         is_short = history.reaction.watchdog.silence < 2 * BAD_TRANSPORT
-        if is_short and kind in (names.BAD_LINE, "flood", "babble"):
+        if is_short and kind in (names.BAD_LINE, *names.FLOODS):
             # It may delay, lose or hide as many heartbeats as a silence has.
             yield Effect((WATCHDOG,), begin, end + SLOWEST, Reason.DEAF, fault)
 

@@ -54,6 +54,8 @@ LOSE = "lose"
 HOLD = "hold"
 """The messages that are sent on a topic in this time arrive together at its end; the topic is the target."""
 
+FLOODS = ("flood", "babble")
+"""Faults in which a stranger sends many messages on a topic."""
 SUSPENDING = ("stop", "pause", "hang", "hog", "slow")
 """Faults in which a process receives nothing until it continues or is replaced."""
 
@@ -205,11 +207,18 @@ class History:
             for program, lives in of_programs.items()
         }
 
+    @cached_property
+    def _of_process(self) -> dict[tuple[str, int], list[Life]]:
+        found: defaultdict[tuple[str, int], list[Life]] = defaultdict(list)
+        for life in self.lives:
+            found[life.program, life.pid].append(life)
+        return found
+
     def effect_end(self, fault: InjectedFault) -> float:
         """Return when a fault ended, or earlier, when its target was replaced; a hang ends only then."""
         if fault.kind not in SUSPENDING:
             return fault.end
-        lives = [life for life in self.lives if (life.program, life.pid) == (fault.target, fault.pid)]
+        lives = self._of_process.get((fault.target, fault.pid), [])
         end = max(fault.end, self.end) if fault.kind == "hang" and lives else fault.end
         return min([end, *(life.ended for life in lives if life.ended)])
 

@@ -115,8 +115,9 @@ def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evid
 
 def _start_limit(history: History, fault: InjectedFault) -> float:
     """Return until when the sentinel lets a process start that hangs before its first sign of life [s]."""
-    for life in history.lives_of(fault.target) if fault.kind == "hang" else ():
-        if life.pid == fault.pid and not between(history.health(fault.target), life.began, fault.begin):
+    for life in history.lives_of(fault.target):
+        is_hung = fault.kind == "hang" and life.pid == fault.pid
+        if is_hung and not between(history.health(fault.target), life.began, fault.begin):
             timeout = history.parameters.get(SENTINEL, {}).get("start_timeout", Timeouts.start)
             return life.began + float(timeout)
     return fault.begin

@@ -28,6 +28,7 @@ from tests.promises.findings import Evidence, Finding, count, how_often
 from tests.promises.history import (
     ALL,
     CONTROLLER,
+    FLOODS,
     HOST,
     SILENCE,
     SWITCH,
@@ -352,20 +353,19 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     missed = [(each.begin, each.end) for each in disturbing(found, ALL, begin, time, Reason.DELAYED)]
     missed += [(life.began, life.began + MATCHED) for life in history.lives_of(SWITCH) if life.began > begin]
     sent = (each.sent for each in between(signs, begin, time))
-    heartbeats = (at for at in sent if not any(start < at < end for start, end in missed))
+    heartbeats = (at for at in sent if not _is_inside(at, missed))
     # Intervals that only touch have a heartbeat in between.
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
+    # Other heartbeats delay those of the operator.
+    floods = [(each.begin, each.end) for each in history.faults if each.kind in FLOODS and each.end > begin]
     return sum(
-        (end - begin + given.sampling + _delay(history, end)) // given.silence for begin, end in silences
+        (end - begin + given.sampling + BAD_TRANSPORT * _is_inside(end, floods)) // given.silence
+        for begin, end in silences
     )
 
 
-def _delay(history: History, time: float) -> float:
-    """Return by how much other heartbeats may delay the operator's at a time [s]."""
-    is_flooded = any(
-        each.kind in ("flood", "babble") and each.begin < time < each.end for each in history.faults
-    )
-    return BAD_TRANSPORT if is_flooded else 0.0
+def _is_inside(time: float, intervals: Sequence[tuple[float, float]]) -> bool:
+    return any(begin < time < end for begin, end in intervals)
 
 
 def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
