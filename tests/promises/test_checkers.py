@@ -322,7 +322,7 @@ def test_l1_program_that_stays_away_after_the_sources_are_back_is_found(
         ({"start_timeout": 31.0}, "stop", 19.9, True),  # that ends by itself
     ],
 )
-def test_l1_program_that_hangs_while_it_starts_has_time_until_the_sentinel_kills_it(
+def test_l1_hang_in_a_start_lasts_until_the_sentinel_kills(
     start_timeout: dict[str, float], kind: str, heard: float, found: bool
 ) -> None:
     lives = [life._replace(ended=20.0) if life.program == "velocity" else life for life in good().lives]

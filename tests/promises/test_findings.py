@@ -440,11 +440,11 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (COMMANDED | {"heartbeats": SHORT, "faults": [bad_line(14.0, 15.0)]}, True),
         (COMMANDED | {"heartbeats": SHORT, "faults": [bad_line(14.5, 15.5)]}, False),
         (COMMANDED | {"heartbeats": SHORT, "lives": two_lives(SWITCH, 13.0)}, True),
+        (COMMANDED | {"heartbeats": SHORT, "lives": two_lives(SWITCH, 12.25)}, False),
         # a flood delays heartbeats by 0.6 s at most
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.0, 16.0, "flood")]}, True),
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.75, 16.0, "babble")]}, False),
         (COMMANDED | {"heartbeats": SHORTER, "faults": [stopped(NO_TARGET, 13.0, 16.0, "flood")]}, False),
-        (COMMANDED | {"heartbeats": SHORT, "lives": two_lives(SWITCH, 12.25)}, False),
         # no presence for ten seconds, for a reason
         (UNSEEN, False),
         (UNSEEN | {"heartbeats": steps(0, 40, 1.0)}, False),
