@@ -141,9 +141,9 @@ class TwoHosts(Testbed):
 
     def start(self, arm: RealArm, parameters: Mapping[str, object]) -> None:
         """Start the arm without its switch, and the switch alone on the operator's host."""
-        arm.system.start(parameters)
-        arm.system.halt(SWITCH)
         program = next(program for program in manifest.programs() if program.name == SWITCH)
+        with manifest.chosen("", without=[SWITCH]):
+            arm.system.start(parameters)
         service = [sys.executable, "-m", program.module, *program.arguments]
         path = os.pathsep.join([str(processes.ROOT), os.environ.get("PYTHONPATH", "")])
         marks = {processes.MARK: str(self._operator.run), "SUPERVISOR_PROCESS_NAME": SWITCH}
