@@ -1,4 +1,7 @@
-"""Ctrl-C and SIGTERM end spinning at once, without an error; a step of the clock delays no timer."""
+"""Ctrl-C and SIGTERM end spinning at once, without an error; a step of the clock delays no timer.
+
+At its end, the interpreter stops daemon threads for good, whatever they hold.
+"""
 
 from __future__ import annotations
 
@@ -46,6 +49,30 @@ async def handle():
     loop.add_signal_handler(signal.SIGUSR1, print)
     loop.remove_signal_handler(signal.SIGUSR1)
 asyncio.run(handle())
+"""
+
+
+ENDS_WHILE_A_LOCK_IS_HELD = """
+import threading, time
+import rclpy
+from std_msgs.msg import String
+from rclpy_ground.cyclonedds.participant import Participant
+
+is_held = threading.Event()
+
+def take_slowly(participant):
+    is_held.set()
+    time.sleep(0.5)
+
+def main():
+    rclpy.init(args=[])
+    node = rclpy.create_node("left_to_the_interpreter")
+    node.itself = node  # only the last collection of garbage frees it
+    Participant._take = take_slowly
+    node.create_publisher(String, "announced", 1)
+    is_held.wait()
+
+main()
 """
 
 
@@ -171,6 +198,7 @@ def test_a_handled_signal_does_not_end_the_next_context(before: str, domain_id: 
 STEP_BACK = """
 import sys
 import rclpy
+from std_msgs.msg import String
 from rclpy_ground.cyclonedds import entities, wakeup
 
 wait, read = entities.WaitSet.wait, wakeup.os.read
@@ -235,3 +263,9 @@ def test_a_signal_shuts_down_each_context_however_it_was_initialized(domain_id: 
         [sys.executable, "-c", TWO_CONTEXTS], capture_output=True, text=True, timeout=60, check=False
     )
     assert (ended.stdout, ended.stderr) == ("False False\n", "")
+
+
+def test_process_ends_while_the_listening_thread_holds_its_lock(domain_id: int) -> None:
+    with running(ENDS_WHILE_A_LOCK_IS_HELD) as process:
+        assert process.communicate(timeout=20.0) == ("", "")
+    assert process.returncode == 0

@@ -6,9 +6,9 @@ name out of the USER_DATA of own endpoints.
 
 from __future__ import annotations
 
+import atexit
 import logging
 import re
-import sys
 import threading
 from dataclasses import replace
 
@@ -55,6 +55,8 @@ class Participant(entities.Participant):
         self._closing = threading.Event()
         self._listener = threading.Thread(target=self._listen, name="ros_discovery_info", daemon=True)
         self._listener.start()
+        # Later, the interpreter would stop the thread for good, even while it holds the lock.
+        atexit.register(self._end_listener)
 
     def create_writer(
         self, topic: str, type_name: str, profile: QoSProfile, user_data: str
@@ -81,12 +83,19 @@ class Participant(entities.Participant):
             return self._discovery
 
     def close(self) -> None:
-        self._closing.set()
-        with self._lock:  # the listening thread holds it while it works
+        atexit.unregister(self._end_listener)
+        self._end_listener()
+        with self._lock:
             self._wait_set.close()
             self._changed.close()
             super().close()
-        if threading.current_thread() is not self._listener and not sys.is_finalizing():
+
+    def _end_listener(self) -> None:
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        self._changed.trigger()
+        if threading.current_thread() is not self._listener:
             # With a timeout: if a signal interrupted the holder of the lock, the thread cannot end yet.
             self._listener.join(1.0)
 
